@@ -1,0 +1,52 @@
+"""asflown: what a spacecraft really is in flight, from its own telemetry.
+
+The public names load on first use, so that ``import asflown`` and ``asflown --help`` cost nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+__version__ = "0.1.0"
+
+_PUBLIC = {
+    "BadInput": "asflown.kit.errors",
+    "Craft": "asflown.craft.model",
+    "load_craft": "asflown.craft.load",
+    "built_in_crafts": "asflown.craft.load",
+    "Telemetry": "asflown.telemetry.telemetry",
+    "load_telemetry": "asflown.telemetry.load",
+    "write_table": "asflown.telemetry.tables",
+    "disturbance_torque": "asflown.estimate.torque",
+    "TorqueResult": "asflown.estimate.result",
+    "compare_torques": "asflown.estimate.compare",
+    "Scenario": "asflown.sim.scenario",
+    "load_scenario": "asflown.sim.scenario",
+    "fly": "asflown.sim.fly",
+    "write_flight": "asflown.sim.fly",
+}
+
+__all__ = [*_PUBLIC, "__version__"]
+
+
+def __getattr__(name: str):
+    if name in _PUBLIC:
+        return getattr(import_module(_PUBLIC[name]), name)
+    raise AttributeError(f"module 'asflown' has no attribute {name!r}")
+
+
+def __dir__():
+    return sorted(__all__)
+
+
+if TYPE_CHECKING:
+    from asflown.craft.load import built_in_crafts, load_craft
+    from asflown.craft.model import Craft
+    from asflown.estimate.compare import compare_torques
+    from asflown.estimate.result import TorqueResult
+    from asflown.estimate.torque import disturbance_torque
+    from asflown.kit.errors import BadInput
+    from asflown.sim.fly import fly, write_flight
+    from asflown.sim.scenario import Scenario, load_scenario
+    from asflown.telemetry.load import load_telemetry
+    from asflown.telemetry.tables import write_table
+    from asflown.telemetry.telemetry import Telemetry

@@ -1,0 +1,1 @@
+"""The program: one verb a file; parse, call, print, exit code.  No thinking here."""

@@ -1,0 +1,105 @@
+"""Crafts: list the built-in ones, show one on a date, check a file of your own."""
+
+from __future__ import annotations
+
+import typer
+
+from .output import plain, print_doubts, print_json, provenance
+
+app = typer.Typer(help=__doc__, no_args_is_help=True, rich_markup_mode=None)
+JSON = typer.Option(False, "--json", help="One JSON object on standard output.")
+
+
+@app.command("list")
+def list_(json: bool = JSON) -> None:
+    """The built-in crafts."""
+    from asflown.craft.load import built_in_crafts, load_craft
+
+    crafts = [load_craft(n) for n in built_in_crafts()]
+    if json:
+        print_json({
+            "command": "craft list",
+            "crafts": [{"name": c.name, "description": c.description, "alternatives": list(c.alternatives)} for c in crafts],
+            "doubts": [], "provenance": provenance({}, {}),
+        })  # fmt: skip
+        return
+    for c in crafts:
+        print(f"{c.name:14s} {c.description}")
+        for name, a in c.alternatives.items():
+            print(f"{'':14s}   {c.name}@{name}: {a.source}")
+
+
+@app.command()
+def show(
+    name: str = typer.Argument(help="A built-in craft or a TOML file."),
+    at: str = typer.Option(None, "--at", help="The date, UTC (default: the latest known state)."),
+    json: bool = JSON,
+) -> None:
+    """A craft as it was on a date."""
+    from asflown.craft.load import load_craft
+    from asflown.kit.timeline import utc_to_tai_ns
+
+    c = load_craft(name)
+    now = c.at(utc_to_tai_ns(at) if at else None)
+    if json:
+        print_json(
+            _record(c, now, at) | {"command": "craft show", "provenance": provenance({}, {"craft": name, "at": at})}
+        )
+        return
+    print(f"{c.name}: {c.description}" + (f", on {at}" if at else ""))
+    if now.inertia_kgm2 is not None:
+        print("  inertia [per unit spin inertia]" if now.relative else "  inertia [kg m2]")
+        for row in now.inertia_kgm2:
+            print("    " + " ".join(f"{v:12.6g}" for v in row))
+    for w in now.wheels:
+        spin = "unknown" if w.spin_inertia is None else f"{w.spin_inertia:.5f} kg m2"
+        print(f"  wheel {w.name:6s} axis ({w.axis[0]:+.4f} {w.axis[1]:+.4f} {w.axis[2]:+.4f})  spin inertia {spin}"
+              + (f"  ({w.note})" if w.note else ""))  # fmt: skip
+    for t in c.thrusters:
+        p, d = t.position, t.direction
+        print(f"  thruster {t.name:3s} at ({p[0]:+.3f} {p[1]:+.3f} {p[2]:+.3f}) m  force along ({d[0]:+g} {d[1]:+g} {d[2]:+g})"
+              f"  {t.nominal_thrust:g} N  delay {1e3 * t.delay:g} rise {1e3 * t.rise:g} fall {1e3 * t.fall:g} ms")  # fmt: skip
+    if k := c.wheel_controller:
+        print(f"  wheel controller: {k.bandwidth:g} Hz, damping {k.damping:g}, KP {k.kp_per_s:.6f} 1/s, KD {k.kd_per_s:.6f} 1/s, "
+              f"rate filter {k.rate_filter.natural_frequency:g} rad/s, damping {k.rate_filter.damping:g}, every {k.period:g} s")  # fmt: skip
+    for m in c.mechanisms:
+        print(f"  mechanism {m.name}: {m.mass:g} kg, {m.from_cm} m from the centre of mass")
+    print_doubts(now.doubts)
+
+
+@app.command()
+def check(file: str = typer.Argument(help="A craft TOML file."), json: bool = JSON) -> None:
+    """Read a craft file and say what is wrong with it, or that nothing is."""
+    from asflown.craft.load import load_craft
+
+    c = load_craft(file)
+    now = c.at(None)
+    if json:
+        print_json(_record(c, now, None) | {"command": "craft check", "provenance": provenance({}, {"craft": file})})
+        return
+    print(f"{file}: a valid craft ({c.name}; {len(c.wheel_names)} wheels, {len(c.thrusters)} thrusters, "
+          f"{len(c.mass_properties)} mass properties)")  # fmt: skip
+    print_doubts(now.doubts)
+
+
+def _record(c, now, at) -> dict:
+    inertia = plain(now.inertia_kgm2)
+    return {
+        "craft": c.name,
+        "at": at,
+        "inertia_kg_m2": None if now.relative else inertia,
+        "inertia_per_spin_inertia": inertia if now.relative else None,
+        "wheels": [{"name": w.name, "axis": w.axis, "spin_inertia_kg_m2": w.spin_inertia} for w in now.wheels],
+        "thrusters": [
+            {"name": t.name, "position_m": t.position, "direction": t.direction, "nominal_thrust_N": t.nominal_thrust,
+             "delay_s": t.delay, "rise_s": t.rise, "fall_s": t.fall, "branch": t.branch} for t in c.thrusters
+        ],
+        "wheel_controller": c.wheel_controller and {
+            "bandwidth_Hz": c.wheel_controller.bandwidth, "damping": c.wheel_controller.damping,
+            "kp_per_s": c.wheel_controller.kp_per_s, "kd_per_s": c.wheel_controller.kd_per_s,
+            "filter_rad_s": c.wheel_controller.rate_filter.natural_frequency,
+            "filter_damping": c.wheel_controller.rate_filter.damping, "period_s": c.wheel_controller.period,
+        },
+        "center_of_mass_m": c.center_of_mass,
+        "doubts": list(now.doubts),
+    }  # fmt: skip

@@ -1,0 +1,43 @@
+"""Options that several verbs share, declared once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+CRAFT = typer.Option("cassini", "--craft", help="A built-in craft (asflown craft list) or a TOML file.")
+INERTIA = typer.Option(
+    None, "--inertia", help='Inertia used as given: "Ixx,Iyy,Izz,Ixy,Ixz,Iyz" in kg m2, tensor elements.'
+)
+CM = typer.Option(None, "--cm", help='Centre of mass "x,y,z" in m, in the thruster positions\' origin.')
+CHANNELS = typer.Option(None, "--channels", help="Channel dictionary (TOML) for a table with other names and units.")
+EXCLUDE = typer.Option(None, "--exclude", help="Spans not to be used: CSV of start, stop, channel, reason.")
+START = typer.Option(None, "--start", help="Start of the window: seconds from the epoch, or UTC.")
+STOP = typer.Option(None, "--stop", help="End of the window: seconds from the epoch, or UTC.")
+JSON = typer.Option(False, "--json", help="One JSON object on standard output.")
+
+
+def craft_from(name: str, inertia: str | None, cm: str | None):
+    """The craft that --craft, --inertia and --cm name."""
+    from asflown.craft.load import load_craft
+    from asflown.kit.quantities import plain_numbers
+
+    return load_craft(
+        name,
+        inertia=plain_numbers(inertia, 6, "--inertia") if inertia is not None else None,
+        cm=plain_numbers(cm, 3, "--cm") if cm is not None else None,
+    )
+
+
+def telemetry_from(file: Path, channels, exclude, start, stop, craft):
+    """Telemetry through the door, cut to the window.  Returns it and the inputs' SHA-256."""
+    from asflown.kit.files import sha256_of
+    from asflown.telemetry.load import load_telemetry
+
+    whole = load_telemetry(file, channels=channels, exclude=exclude, craft=craft)
+    inputs = {whole.source: whole.sha256}
+    for other in (channels, exclude):
+        if other is not None:
+            inputs[str(other)] = sha256_of(Path(other).read_bytes())
+    return whole.between(start, stop), inputs

@@ -1,0 +1,60 @@
+"""How every verb speaks: one JSON object or one table on standard output, the rest on standard error."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from datetime import date
+from pathlib import Path
+
+
+def plain(value):
+    """Anything a result holds, as JSON has it: numbers finite or null, arrays as lists."""
+    if value is None or isinstance(value, (str, bool)):
+        return value
+    if isinstance(value, int):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, (Path, date)):
+        return str(value)
+    if hasattr(value, "tolist"):  # numpy, without importing it here
+        return plain(value.tolist())
+    if isinstance(value, (list, tuple, set)):
+        return [plain(v) for v in value]
+    raise TypeError(f"no JSON form for {type(value).__name__}")
+
+
+def print_json(record: dict) -> None:
+    """The one JSON object of a verb."""
+    sys.stdout.write(json.dumps(plain(record), allow_nan=False) + "\n")
+
+
+def provenance(inputs: dict[str, str], options: dict, seed=None) -> dict:
+    """Which files (name -> SHA-256), versions, options and seed made a result."""
+    import platform
+    from importlib.metadata import version
+
+    return {
+        "inputs": [{"file": name, "sha256": digest} for name, digest in inputs.items()],
+        "versions": {
+            "python": platform.python_version(),
+            **{p: version(p) for p in ("asflown", "numpy", "scipy", "numba", "astropy")},
+        },
+        "options": options,
+        "seed": seed,
+    }
+
+
+def say(text: str = "") -> None:
+    """Progress and remarks: standard error, so that standard output stays clean."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def print_doubts(doubts) -> None:
+    """Doubts in words, under every text result."""
+    for d in doubts:
+        print(f"  DOUBT  {d}")

@@ -1,0 +1,1 @@
+"""The vehicle as data: one validated, frozen description from one TOML file."""

@@ -1,0 +1,371 @@
+"""What a spacecraft is: mass properties by date, wheels, thrusters, controller, mechanisms.
+
+Values are SI with radians once loaded; in the TOML every value carries its unit.  Vectors are in
+body axes.  Inertia tensors are written Ixx Iyy Izz Ixy Ixz Iyz, tensor elements (not negated
+products of inertia), about the centre of mass.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+
+from ..kit.errors import BadInput, some_of
+from ..kit.quantities import numbers, quantity
+from ..kit.timeline import utc_label, utc_to_tai_ns
+
+
+def _in(unit: str, count: int = 0):
+    """A field written as text with a unit, kept as SI."""
+    parse = (lambda v: numbers(v, unit, count)) if count else (lambda v: quantity(v, unit))
+    kind = tuple[(float,) * count] if count else float
+    return Annotated[kind, BeforeValidator(parse)]
+
+
+Kilogram, Second, Newton, Hertz = _in("kg"), _in("s"), _in("N"), _in("Hz")
+KilogramMetre2, NewtonMetre, Radian, RadianPerSecond = _in("kg m2"), _in("N m"), _in("rad"), _in("rad/s")
+Metre, Metre2, MetrePerSecond = _in("m"), _in("m2"), _in("m/s")
+MetreVector, Direction = _in("m", 3), _in("", 3)
+InertiaElements, InertiaRatio = _in("kg m2", 6), _in("", 6)
+NewtonMetreSecond = _in("N m s")
+
+
+def _spin_inertia(value):
+    return None if str(value).strip() == "unknown" else quantity(value, "kg m2")
+
+
+SpinInertia = Annotated[float | None, BeforeValidator(_spin_inertia)]
+
+
+def _utc_ns(value):
+    return utc_to_tai_ns(str(value))
+
+
+Date = Annotated[int, BeforeValidator(_utc_ns)]  # int64 ns TAI
+
+
+def tensor(elements) -> np.ndarray:
+    """Ixx Iyy Izz Ixy Ixz Iyz -> 3 x 3."""
+    xx, yy, zz, xy, xz, yz = elements
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], float)
+
+
+def check_inertia(I_B: np.ndarray, what: str) -> None:
+    """Refuse a tensor no body can have: positive definite, and the triangle inequality."""
+    w = np.linalg.eigvalsh(I_B)
+    if w[0] <= 0 or w[0] + w[1] < w[2] * (1 - 1e-9):
+        raise BadInput(
+            f"{what}: no rigid body has this inertia (principal moments {w[0]:.6g}, {w[1]:.6g}, {w[2]:.6g} kg m2)",
+            remedy="Moments must be positive and no one larger than the sum of the other two. The order is "
+            "Ixx, Iyy, Izz, Ixy, Ixz, Iyz in kg m2, tensor elements (not negated products of inertia).",
+        )
+
+
+class _Data(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class MassProperties(_Data):
+    """The inertia tensor at one date.  Entries of one ``piece`` may be interpolated between."""
+
+    date: Date
+    piece: str
+    inertia: InertiaElements | None = None
+    inertia_per_spin_inertia: InertiaRatio | None = None  # where only the ratio to the wheels' is known
+    basis: Literal["estimated", "predicted", "extrapolated", "inferred", "assumed"] = "estimated"
+    mass: Kilogram | None = None
+    source: str = ""
+    doubt: str = ""
+
+    @model_validator(mode="after")
+    def _possible(self):
+        if (self.inertia is None) == (self.inertia_per_spin_inertia is None):
+            raise ValueError("give either inertia or inertia_per_spin_inertia")
+        check_inertia(tensor(self.elements), f"mass properties {self.piece!r}")
+        return self
+
+    @property
+    def elements(self):
+        return self.inertia if self.inertia is not None else self.inertia_per_spin_inertia
+
+
+class PropellantUsed(_Data):
+    date: Date
+    used: Kilogram
+    source: str = ""
+
+
+class Drag(_Data):
+    """A wheel's bearing drag.  Assumed values unless a source says otherwise."""
+
+    viscous: _in("N m s / rad") = 0.0  # type: ignore[valid-type]
+    coulomb: NewtonMetre = 0.0
+    stiction: NewtonMetre = 0.0
+    source: str = ""
+
+
+class Wheel(_Data):
+    """A reaction wheel: momentum = spin inertia x rate relative to the body, along ``axis``."""
+
+    name: str
+    axis: Direction
+    spin_inertia: SpinInertia
+    valid_from: Date | None = None
+    valid_to: Date | None = None
+    rate_limit: RadianPerSecond | None = None
+    torque_limit: NewtonMetre | None = None
+    drag: Drag = Drag()
+    note: str = ""
+
+    @model_validator(mode="after")
+    def _unit_axis(self):
+        if abs(np.linalg.norm(self.axis) - 1) > 1e-6:
+            raise ValueError(f"wheel {self.name}: the axis is not a unit vector")
+        return self
+
+    def serves_at(self, tai_ns: int) -> bool:
+        return (self.valid_from is None or tai_ns >= self.valid_from) and (
+            self.valid_to is None or tai_ns < self.valid_to
+        )
+
+
+class Thruster(_Data):
+    """A thruster: ``direction`` is that of the force on the body."""
+
+    name: str
+    position: MetreVector
+    direction: Direction
+    nominal_thrust: Newton
+    delay: Second = 0.0
+    rise: Second = 0.0
+    fall: Second = 0.0
+    branch: str = ""
+
+
+class ThrustHistory(_Data):
+    date: Date
+    thrust: Newton
+    source: str = ""
+
+
+class RateFilter(_Data):
+    """Identical second-order low-pass sections in cascade."""
+
+    natural_frequency: RadianPerSecond
+    damping: float
+    sections: Literal[2] = 2
+
+
+class WheelController(_Data):
+    """Proportional-derivative control on filtered rate (000 eqs 12, 13; see dynamics.loop)."""
+
+    bandwidth: Hertz
+    damping: float
+    rate_filter: RateFilter
+    period: Second
+
+    @property
+    def natural_frequency_rad_s(self) -> float:
+        return 2 * np.pi * self.bandwidth
+
+    @property
+    def kp_per_s(self) -> float:
+        """KP = wn / (2 zn), with the loop's own damping (000 eq 12 prints the filter's symbol)."""
+        return self.natural_frequency_rad_s / (2 * self.damping)
+
+    @property
+    def kd_per_s(self) -> float:
+        return 2 * self.damping * self.natural_frequency_rad_s
+
+
+class Mechanism(_Data):
+    """A part that moves: a cover, a boom, an antenna."""
+
+    name: str
+    mass: Kilogram
+    inertia: InertiaElements  # about its own centre of mass
+    from_cm: MetreVector  # its centre of mass, from the spacecraft's
+    hinge_axis: Direction
+    stowed: Radian
+    deployed: Radian
+    cycles_allowed: int | None = None
+    source: str = ""
+    assumptions: tuple[str, ...] = ()
+
+    def inertia_about_craft(self) -> np.ndarray:
+        """Its part of the craft's tensor: I_own + m (L.L 1 - L L^T)  (braces of 000 eqs 4a-c)."""
+        L = np.asarray(self.from_cm)
+        return tensor(self.inertia) + self.mass * (L @ L * np.eye(3) - np.outer(L, L))
+
+
+class FlexibleMode(_Data):
+    """One appendage mode in hybrid coordinates; ``coupling`` is the row delta of d/dt(delta eta_dot)."""
+
+    name: str
+    frequency: Hertz
+    damping: float
+    coupling: _in("kg(1/2) m", 3)  # type: ignore[valid-type]
+    source: str = ""
+
+
+class Accelerometer(_Data):
+    axis: Direction
+    scale: MetrePerSecond  # per count
+    source: str = ""
+
+
+class Aerodynamics(_Data):
+    drag_coefficient: float
+    drag_coefficient_sigma: float
+    projected_area: Metre2
+    moment_arm: Metre
+    source: str = ""
+
+
+class Alternative(_Data):
+    """A named set of other values found in print."""
+
+    spin_inertia: dict[str, SpinInertia] = Field(default_factory=dict)
+    source: str = ""
+
+
+class Craft(_Data):
+    """A whole vehicle.  ``at(date)`` gives it as it was on a day."""
+
+    name: str
+    description: str = ""
+    mass_properties: tuple[MassProperties, ...] = ()
+    propellant: tuple[PropellantUsed, ...] = ()
+    wheels: tuple[Wheel, ...] = ()
+    wheel_controller: WheelController | None = None
+    thrusters: tuple[Thruster, ...] = ()
+    thrust_history: tuple[ThrustHistory, ...] = ()
+    mechanisms: tuple[Mechanism, ...] = ()
+    flexible_modes: tuple[FlexibleMode, ...] = ()
+    accelerometer: Accelerometer | None = None
+    aerodynamics: Aerodynamics | None = None
+    center_of_mass: MetreVector | None = None
+    alternatives: dict[str, Alternative] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _consistent(self):
+        for things in (self.thrusters, self.mechanisms, self.flexible_modes):
+            names = [t.name for t in things]
+            if len(set(names)) != len(names):
+                raise ValueError(f"a name is used twice: {some_of(names)}")
+        relative = {w.spin_inertia is None for w in self.wheels}
+        if len(relative) > 1:
+            raise ValueError("either every wheel's spin inertia is known or none is")
+        return self
+
+    @property
+    def wheel_names(self) -> list[str]:
+        return list(dict.fromkeys(w.name for w in self.wheels))
+
+    def mechanism(self, name: str) -> Mechanism:
+        for m in self.mechanisms:
+            if m.name == name:
+                return m
+        raise BadInput(
+            f"{self.name} has no mechanism {name!r}",
+            remedy=f"Its mechanisms: {some_of(m.name for m in self.mechanisms)}.",
+        )
+
+    def with_alternative(self, name: str) -> Craft:
+        if name not in self.alternatives:
+            raise BadInput(f"{self.name} has no alternative {name!r}", remedy=f"It has: {some_of(self.alternatives)}.")
+        other = self.alternatives[name].spin_inertia
+        wheels = tuple(w.model_copy(update={"spin_inertia": other.get(w.name, w.spin_inertia)}) for w in self.wheels)
+        return self.model_copy(update={"wheels": wheels})
+
+    def with_inertia(self, elements, cm=None) -> Craft:
+        """The same craft with one tensor for all dates, used as given."""
+        changes: dict = {}
+        if elements is not None:
+            given = MassProperties.model_construct(
+                date=0, piece="given", inertia=tuple(elements), inertia_per_spin_inertia=None,
+                basis="assumed", mass=None, source="given by the user", doubt="",
+            )  # fmt: skip
+            check_inertia(tensor(elements), "the inertia given")
+            changes["mass_properties"] = (given,)
+        if cm is not None:
+            changes["center_of_mass"] = tuple(cm)
+        return self.model_copy(update=changes)
+
+    def at(self, tai_ns: int | None) -> CraftAt:
+        """The craft on a date (None: the latest known state)."""
+        doubts: list[str] = []
+        moment = tai_ns if tai_ns is not None else max((m.date for m in self.mass_properties), default=0)
+        wheels = [w for w in self.wheels if w.serves_at(moment)] if tai_ns is not None else _latest(self.wheels)
+        I_B, relative = self._inertia_at(moment, doubts)
+        return CraftAt(self, tai_ns, I_B, relative, tuple(wheels), tuple(doubts))
+
+    def _inertia_at(self, moment: int, doubts: list[str]):
+        known = sorted((m for m in self.mass_properties if m.basis != "predicted"), key=lambda m: m.date)
+        if not known:
+            return None, False
+        if known[0].piece == "given":
+            return tensor(known[0].elements), False
+        before = [m for m in known if m.date <= moment]
+        after = [m for m in known if m.date > moment]
+        a = before[-1] if before else after[0]
+        b = after[0] if before and after and after[0].piece == a.piece else a
+        if b is not a and moment - a.date > 5 * 86_400 * 10**9:
+            x, how = self._fraction(a.date, b.date, moment)
+            I_B = (1 - x) * tensor(a.elements) + x * tensor(b.elements)
+            for m in (a, b):
+                if m.doubt and 0 < x < 1 and m.doubt not in doubts:
+                    doubts.append(m.doubt)
+            if how == "date":
+                doubts.append(
+                    f"the inertia on {utc_label(moment)[:10]} is interpolated by date between {utc_label(a.date)[:10]} and "
+                    f"{utc_label(b.date)[:10]}: the propellant used in between is not known"
+                )
+        else:
+            I_B = tensor(a.elements)
+            if a.doubt:
+                doubts.append(a.doubt)
+            if abs(moment - a.date) > 200 * 86_400 * 10**9:
+                doubts.append(
+                    f"the inertia is that of {utc_label(a.date)[:10]}, the nearest date known for this configuration"
+                )
+        return I_B, a.inertia is None
+
+    def _fraction(self, start: int, stop: int, moment: int) -> tuple[float, str]:
+        """How far between two dates: by propellant used where the ledger covers them, else by date."""
+        ledger = sorted(self.propellant, key=lambda p: p.date)
+        if ledger and ledger[0].date <= start and stop <= ledger[-1].date:
+            dates, used = [p.date for p in ledger], [p.used for p in ledger]
+            u0, u, u1 = (float(np.interp(float(t), dates, used)) for t in (start, moment, stop))
+            if u1 > u0:
+                return (u - u0) / (u1 - u0), "propellant"
+        return (moment - start) / (stop - start), "date"
+
+
+def _latest(wheels):
+    """The set in service last, for data without a date."""
+    return [w for w in wheels if w.valid_to is None]
+
+
+@dataclass(frozen=True)
+class CraftAt:
+    """A craft on one date: what an estimator asks for."""
+
+    craft: Craft
+    tai_ns: int | None
+    inertia_kgm2: np.ndarray | None  # (3, 3); per unit spin inertia where ``relative``
+    relative: bool
+    wheels: tuple[Wheel, ...]
+    doubts: tuple[str, ...] = field(default=())
+
+    def wheel(self, name: str) -> Wheel | None:
+        return next((w for w in self.wheels if w.name == name), None)
+
+    def effective_inertia(self, mechanism: str) -> np.ndarray:
+        """Inertia of the craft without a moving part, by the parallel-axis theorem (000 eqs 4, 5)."""
+        I_B = self.inertia_kgm2 - self.craft.mechanism(mechanism).inertia_about_craft()
+        check_inertia(I_B, f"{self.craft.name} without its {mechanism}")
+        return I_B

@@ -1,0 +1,1 @@
+"""What the estimators know of physics: pure functions, each with its source."""

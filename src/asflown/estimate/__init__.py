@@ -1,0 +1,1 @@
+"""One characterization a file: telemetry and craft in, a result that doubts itself out."""

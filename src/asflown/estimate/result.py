@@ -1,0 +1,164 @@
+"""A reconstructed torque: values, band, peaks, and what there is to doubt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import signal
+
+from ..kit.files import write_text
+
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Peak:
+    """One excursion: its time (seconds from the epoch), torque [N m] and axis."""
+
+    time_s: float
+    torque_Nm: float
+    axis: str
+
+
+@dataclass(frozen=True)
+class TorqueResult:
+    """Disturbance torque on the body, in body axes.
+
+    ``torque_Nm``, ``sigma_Nm``, ``momentum_Nms``: (M, 3); NaN where nothing is known.  Where
+    ``relative`` is set the wheels' spin inertia is unknown and all three are per unit of it (rad/s^2
+    and rad/s).  ``time_s`` counts from the telemetry's epoch."""
+
+    craft: str
+    method: str
+    variant: str
+    axis: str  # x, y, z or all
+    epoch: str
+    time_s: np.ndarray
+    torque_Nm: np.ndarray
+    sigma_Nm: np.ndarray | None
+    momentum_Nms: np.ndarray | None
+    doubts: tuple[str, ...] = ()
+    relative: bool = False
+    settings: dict = field(default_factory=dict)  # what the estimator chose: windows, model, inertia
+    fits: tuple[dict, ...] = ()  # the polynomial method's orders and misfits
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        return (0, 1, 2) if self.axis == "all" else (AXES.index(self.axis),)
+
+    @property
+    def peaks(self) -> list[Peak]:
+        return [p for a in self.axes for p in find_peaks(self, a)]
+
+    @property
+    def unit(self) -> str:
+        return "rad/s^2, per unit spin inertia" if self.relative else "N m"
+
+    def __str__(self) -> str:
+        """The table a person scans."""
+        T = self.torque_Nm[:, list(self.axes)]
+        known = np.isfinite(T).all(axis=1)
+        lines = [
+            f"Disturbance torque · {self.craft} · {self.method}, {self.variant} · epoch {self.epoch}",
+            f"  {known.sum()} instants from {self.time_s[0]:g} s to {self.time_s[-1]:g} s, {(~known).sum()} of {len(known)} unknown · "
+            f"[{self.unit}]",
+        ]
+        for j in self.axes:
+            t = self.torque_Nm[:, j]
+            if not np.isfinite(t).any():
+                continue
+            band = "" if self.sigma_Nm is None else f"   1 sigma {np.nanmedian(self.sigma_Nm[:, j]):.2g}"
+            lines.append(f"  {AXES[j]}   mean {np.nanmean(t):+.3g}   rms {np.sqrt(np.nanmean(t**2)):.3g}{band}")
+            lines += [f"      peak {p.torque_Nm:+.4g} at {p.time_s:.0f} s" for p in find_peaks(self, j)[:12]]
+        for f in self.fits:
+            if f["axis"] in self.axis or self.axis == "all":
+                rms = next(v for k, v in f.items() if k.startswith("rms_") and k != "rms_percent")
+                share = "" if f["rms_percent"] is None else f" ({f['rms_percent']:.2f} % of the mean size)"
+                lines.append(f"  order {f['order']:2d}, {f['channel']} {f['axis']}: rms misfit {rms:.4g}{share}")
+        return "\n".join(lines)
+
+    def column(self, values) -> np.ndarray | None:
+        """(M,) of the one axis, or (M, 3)."""
+        if values is None:
+            return None
+        return values if self.axis == "all" else values[:, self.axes[0]]
+
+    def record(self) -> dict:
+        """The JSON form, without command and provenance."""
+        names = ("torque_Nm", "sigma_Nm", "momentum_Nms")
+        values = {n: self.column(getattr(self, n)) for n in names}
+        peaks = [
+            {"time_s": p.time_s, "torque_Nm": p.torque_Nm} | ({"axis": p.axis} if self.axis == "all" else {})
+            for p in self.peaks
+        ]
+        record = {
+            "craft": self.craft,
+            "method": self.method,
+            "variant": self.variant,
+            "axis": self.axis,
+            "epoch": self.epoch,
+            "time_s": self.time_s,
+            **values,
+            "peaks": peaks,
+            "doubts": list(self.doubts),
+            "settings": self.settings,
+        }
+        if self.relative:  # a number per unit spin inertia must not stand under a key that says N m
+            record |= {
+                "torque_Nm": None,
+                "sigma_Nm": None,
+                "momentum_Nms": None,
+                "torque_per_spin_inertia_rad_s2": values["torque_Nm"],
+                "sigma_per_spin_inertia_rad_s2": values["sigma_Nm"],
+                "momentum_per_spin_inertia_rad_s": values["momentum_Nms"],
+            }
+            for p in peaks:
+                p["torque_per_spin_inertia_rad_s2"], p["torque_Nm"] = p["torque_Nm"], None
+        if self.fits:
+            record["fits"] = list(self.fits)
+        return record
+
+
+def find_peaks(result: TorqueResult, axis: int) -> list[Peak]:
+    """Excursions that stand out: prominence above a quarter of the largest, and above 4 sigma."""
+    torque = result.torque_Nm[:, axis]
+    known = np.isfinite(torque)
+    if known.sum() < 3 or not np.any(torque[known]):
+        return []
+    threshold = 0.25 * np.nanmax(np.abs(torque))
+    if result.sigma_Nm is not None:
+        threshold = max(threshold, 4 * float(np.nanmedian(result.sigma_Nm[known, axis])))
+    filled = np.where(known, torque, 0.0)
+    found: list[int] = []
+    for sign in (1, -1):
+        at, _ = signal.find_peaks(sign * filled, height=threshold, prominence=threshold)
+        found += at.tolist()
+    return [Peak(float(result.time_s[k]), float(torque[k]), AXES[axis]) for k in sorted(found)]
+
+
+def save_csv(result: TorqueResult, path, provenance: dict) -> None:
+    """The torque as a self-describing table: time, torque, sigma and momentum per axis; blank where unknown.
+
+    Doubts and provenance stand in comment lines.  Nothing half-written stays."""
+    unit, momentum_unit = ("rad/s2", "rad/s") if result.relative else ("N m", "N m s")
+    suffix = "_per_spin_inertia" if result.relative else ""
+    columns = [("time [s]", result.time_s)]
+    for name, values, u in (
+        ("disturbance_torque", result.torque_Nm, unit),
+        ("sigma_torque", result.sigma_Nm, unit),
+        ("momentum", result.momentum_Nms, momentum_unit),
+    ):
+        if values is not None:
+            columns += [(f"{name}{suffix}_{AXES[j]} [{u}]", values[:, j]) for j in result.axes]
+    lines = [
+        f"# epoch: {result.epoch}",
+        f"# disturbance torque on the body, body axes; craft {result.craft}; {result.method}, {result.variant}",
+        *(f"# DOUBT {d}" for d in result.doubts),
+        *(f"# input {i['file']} sha256 {i['sha256']}" for i in provenance["inputs"]),
+        f"# asflown {provenance['versions']['asflown']}, options {provenance['options']}",
+        ",".join(name for name, _ in columns),
+    ]
+    for row in zip(*(v for _, v in columns), strict=True):
+        lines.append(",".join(repr(float(v)) if np.isfinite(v) else "" for v in row))
+    write_text(path, "\n".join(lines) + "\n")

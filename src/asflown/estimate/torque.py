@@ -1,0 +1,163 @@
+"""One call for the disturbance torque: choose a method, get a result that knows its doubts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..craft.model import Craft
+from ..kit.errors import BadInput, some_of
+from ..telemetry.telemetry import Telemetry
+from . import torque_momentum, torque_polynomial, torque_transfer
+from .compare import consistency_doubts
+from .result import AXES, TorqueResult, find_peaks
+from .subject import Subject, subject_of
+
+METHODS = ("momentum", "transfer", "polynomial")
+VARIANTS = ("corrected", "printed")
+
+
+def disturbance_torque(
+    telemetry: Telemetry,
+    craft: Craft,
+    *,
+    method: str = "momentum",
+    variant: str = "corrected",
+    axis: str = "all",
+    model: str | None = None,
+    order: int = 12,
+    window_s: float | None = None,
+    moving: str | None = "auto",
+) -> TorqueResult:
+    """The torque on the body that the actuators did not command, in body axes. [N m]
+
+    ``method``: 'momentum' (000 eqs 2-9), 'transfer' (000 eqs 10-20; ``model`` low, hankel or full) or
+    'polynomial' (004 eqs 7, 17, 18; ``order`` 6, 12, 15 or 18).  ``variant``: 'corrected', or
+    'printed', the paper's way with its faults.  ``window_s``: full width of the corrected methods'
+    local fits, in place of the studied ones.  ``moving``: see ``subject_of``.
+
+    Positive torque turns the body about +axis.  Raises BadInput where the telemetry lacks what the
+    method needs, names wheels the craft does not have, or is shorter than the window."""
+    _check(method, METHODS, "method")
+    _check(variant, VARIANTS, "variant")
+    _check(axis, (*AXES, "all"), "axis")
+    if model is not None:
+        _check(model, torque_transfer.MODELS, "model")
+    if window_s is not None and not 0 < window_s < 1e9:
+        raise BadInput(f"a window of {window_s} s is not possible", remedy="Give a positive number of seconds.")
+    subject = subject_of(telemetry, craft, moving)
+    answer = _run(subject, method, variant, model, order, window_s)
+    grid, torque, sigma, momentum, settings, doubts, fits = answer
+    time_s = grid.from_epoch(telemetry)
+    columns = list(range(3)) if axis == "all" else [AXES.index(axis)]
+    for j in columns:
+        if not np.isfinite(torque[:, j]).any():
+            telemetry.channel(f"attitude_error_{AXES[j]}")  # the only channels that may lack an axis
+    result = TorqueResult(
+        craft=craft.name,
+        method=method,
+        variant=variant,
+        axis=axis,
+        epoch=telemetry.epoch_label,
+        time_s=time_s,
+        torque_Nm=torque,
+        sigma_Nm=sigma,
+        momentum_Nms=momentum,
+        relative=subject.relative and method != "transfer",
+        settings=settings | _inertia_used(subject),
+        fits=tuple(fits),
+    )
+    doubts = [*subject.doubts, *doubts, *_relative_doubts(subject, result)]
+    if method == "momentum" and variant == "corrected":
+        doubts += _smoothing_doubts(result, settings["half_width_body_s"])
+    ready = {method: answer} if variant == "corrected" and sigma is not None else {}
+    doubts += _consistency(subject, ready)
+    return _with_doubts(result, doubts)
+
+
+def _run(subject: Subject, method, variant, model, order, window_s):
+    if method == "polynomial":
+        return torque_polynomial.polynomial(subject, order, model or "low")
+    module = {"momentum": torque_momentum, "transfer": torque_transfer}[method]
+    options: dict = {}
+    if method == "transfer":
+        options["model"] = model or ("low" if variant == "printed" else "full")
+        if variant == "printed" and options["model"] == "full":
+            raise BadInput(
+                "the printed transfer method has no full model", remedy="Use --variant corrected --model full."
+            )
+    if variant == "corrected":
+        options["window_s"] = window_s
+    return (*getattr(module, variant)(subject, **options), ())
+
+
+def _check(value, allowed, what):
+    if value not in allowed:
+        raise BadInput(f"{what} {value!r} is not known", remedy=f"Choose one of: {some_of(allowed)}.")
+
+
+def _inertia_used(subject: Subject) -> dict:
+    I_B = subject.inertia_kgm2
+    key = "inertia_per_spin_inertia" if subject.craft.relative else "inertia_kg_m2"
+    return {
+        key: None if I_B is None else I_B.tolist(),
+        "mechanism_taken_off": subject.moving,
+        "wheels": [w.name for w in subject.craft.wheels],
+    }
+
+
+def _relative_doubts(subject: Subject, result: TorqueResult) -> list[str]:
+    if not result.relative:
+        return []
+    return [
+        "the wheels' spin inertia is not known: torque and momentum are per unit spin inertia (rad/s^2, rad/s), not N m"
+    ]
+
+
+#: A corner rounded twice is rounded over sqrt(2) times the width: the first pass took this many times
+#: what the second takes.
+_FIRST_PASS = 1 / (np.sqrt(2) - 1)
+
+
+def _smoothing_doubts(result: TorqueResult, half_width_s: float) -> list[str]:
+    """Say how much of each peak the window took."""
+    step = float(result.time_s[1] - result.time_s[0]) if len(result.time_s) > 1 else 1.0
+    worst, noise = 0.0, 0.0
+    for j in result.axes:
+        loss = torque_momentum.smoothing_loss(step, result.torque_Nm[:, j], half_width_s)
+        for p in find_peaks(result, j):
+            k = int(np.argmin(np.abs(result.time_s - p.time_s)))
+            worst = max(worst, _FIRST_PASS * float(loss[k] / p.torque_Nm))
+            noise = max(noise, 2 * float(result.sigma_Nm[k, j] / abs(p.torque_Nm)))
+    if worst < 0.02:
+        return []
+    if worst > 0.5:
+        return [
+            f"some excursions are no wider than the smoothing window of +-{half_width_s:.0f} s: their height and shape are not "
+            "resolved, only their impulse is; --window can be made shorter at the price of noise"
+        ]
+    return [
+        f"smoothing over +-{half_width_s:.0f} s rounds sharp peaks: they may be low by up to {100 * worst:.0f} %, besides "
+        f"+-{100 * noise:.0f} % of noise (2 sigma); the band holds only the noise, and single peaks can be further off than the "
+        "printed method's, whose two faults offset each other"
+    ]
+
+
+def _consistency(subject: Subject, ready: dict) -> list[str]:
+    """Set wheels against attitude error where both are there: signs and units betray themselves."""
+    tlm = subject.telemetry
+    wheels = bool(tlm.members("wheel_rate")) and not subject.relative
+    errors = any(f"attitude_error_{a}" in tlm for a in AXES)
+    if not (wheels and errors) or subject.inertia_kgm2 is None or subject.craft.craft.wheel_controller is None:
+        return []
+    try:
+        a = ready.get("momentum") or torque_momentum.corrected(subject)
+        b = ready.get("transfer") or torque_transfer.corrected(subject)
+    except BadInput:
+        return []  # one of the two cannot be had: nothing to set against each other
+    return consistency_doubts(a[0], a[1], a[2], b[0], b[1], b[2])
+
+
+def _with_doubts(result: TorqueResult, doubts) -> TorqueResult:
+    return replace(result, doubts=tuple(dict.fromkeys(doubts)))

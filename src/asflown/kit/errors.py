@@ -1,0 +1,47 @@
+"""One kind of error for bad input: what, where, and what to do next."""
+
+from __future__ import annotations
+
+
+class BadInput(ValueError):
+    """Input that cannot be used.  The command line turns it into one message and exit code 2.
+
+    ``what`` says what is wrong, ``remedy`` what to do about it.  ``file``, ``channel``, ``time``
+    and ``line`` say where, in the message and as attributes for code.
+    """
+
+    LONGEST = 1400  # characters; a message nobody scrolls
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        remedy: str,
+        file: object = None,
+        channel: str | None = None,
+        time: str | None = None,
+        line: int | None = None,
+    ):
+        self.what, self.remedy = what, remedy
+        self.file = None if file is None else str(file)
+        self.channel, self.time, self.line = channel, time, line
+        place = self.file or ""
+        if line is not None:
+            place += f", line {line}" if place else f"line {line}"
+        if channel is not None:
+            place += f", channel {channel}" if place else f"channel {channel}"
+        if time is not None:
+            place += f", at {time}" if place else f"at {time}"
+        head = f"{place}: {what}" if place else what
+        room = self.LONGEST - len(remedy) - 2
+        if len(head) > room:
+            head = head[: room - 1] + "…"
+        super().__init__(f"{head}\n{remedy}")
+
+
+def some_of(names, most: int = 12) -> str:
+    """A list of names for a message, never longer than a person reads."""
+    names = [str(n) for n in names]
+    if len(names) <= most:
+        return ", ".join(names) if names else "none"
+    return ", ".join(names[:most]) + f" and {len(names) - most} more"

@@ -1,0 +1,48 @@
+"""Quaternions and small angles, in one stated convention.
+
+Scalar first, Hamilton product.  R(q) takes body vectors to inertial ones, v_N = R(q_NB) v_B: the
+numbers are the same as those of the passive inertial-to-body form.  The algebra is SciPy's.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+
+def rotation(q_NB) -> Rotation:
+    """SciPy's rotation for scalar-first quaternions, shape (4,) or (N, 4)."""
+    return Rotation.from_quat(np.asarray(q_NB, float), scalar_first=True)
+
+
+def quaternion(r: Rotation) -> np.ndarray:
+    return r.as_quat(scalar_first=True)
+
+
+def attitude_error(q_commanded, q_estimated) -> np.ndarray:
+    """Commanded minus estimated, a small-angle vector in body axes. [rad], shape (..., 3)
+
+    q_c = q_e (x) [1, e/2]: turning the body by +e brings it to the command."""
+    return (rotation(q_estimated).inv() * rotation(q_commanded)).as_rotvec()
+
+
+def rates_between(time_s, q_NB) -> tuple[np.ndarray, np.ndarray]:
+    """Mean body rate between successive attitudes. [rad/s]
+
+    Returns the mid times (N-1,) and rates (N-1, 3) in body axes.  q and -q are the same attitude."""
+    r = rotation(q_NB)
+    step = (r[:-1].inv() * r[1:]).as_rotvec()
+    dt = np.diff(time_s)
+    # half a step on, the body axes have turned by half the angle: the rate vector is the same in both
+    return np.asarray(time_s[:-1]) + dt / 2, step / dt[:, None]
+
+
+def lvlh_to_inertial(position_N, velocity_N) -> Rotation:
+    """LVLH axes (z to the planet, y against the orbit normal, x along the velocity) to inertial.
+
+    position, velocity: (N, 3), any consistent unit."""
+    r, v = np.asarray(position_N, float), np.asarray(velocity_N, float)
+    z = -r / np.linalg.norm(r, axis=1, keepdims=True)
+    y = -np.cross(r, v)
+    y /= np.linalg.norm(y, axis=1, keepdims=True)
+    return Rotation.from_matrix(np.stack([np.cross(y, z), y, z], axis=2))

@@ -1,0 +1,57 @@
+"""How figures look, and how they are saved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..kit.errors import BadInput
+from ..kit.files import write_whole
+
+#: Colours that also differ in grey and for the colour-blind (Okabe and Ito).
+BLUE, ORANGE, GREEN, RED, PURPLE, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#777777"
+BY_AXIS = (BLUE, ORANGE, GREEN)
+
+
+def new_figure(rows: int = 1, columns: int = 1, *, width: float = 8.0, height: float = 3.0, sharex: bool = True):
+    """A figure of its own, outside pyplot's global state, and its axes as a list."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height * rows), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = np.atleast_1d(figure.subplots(rows, columns, sharex=sharex)).ravel().tolist()
+    for ax in axes:
+        ax.grid(True, color="#e4e4e4", linewidth=0.6)
+        ax.set_axisbelow(True)
+        for side in ("top", "right"):
+            ax.spines[side].set_visible(False)
+    return figure, axes
+
+
+def save(figure, path: str | Path) -> None:
+    """SVG, PNG or PDF by the suffix; text stays text in SVG, and equal input gives equal bytes."""
+    import matplotlib
+
+    path = Path(path)
+    if path.suffix not in (".svg", ".png", ".pdf"):
+        raise BadInput(
+            f"cannot draw into {path.suffix or 'a file without suffix'!r}",
+            file=path,
+            remedy="Name it .svg, .png or .pdf.",
+        )
+    date_key = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": {}}[path.suffix]
+    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "asflown", "font.family": "sans-serif"}):
+        write_whole(path, lambda p: figure.savefig(p, format=path.suffix[1:], dpi=150, metadata=date_key))
+
+
+def breaks(time_s, values, longest_step_s: float):
+    """Time and values with a NaN put into every gap, so that no line is drawn across it."""
+    time_s, values = np.asarray(time_s, float), np.asarray(values, float)
+    at = np.flatnonzero(np.diff(time_s) > longest_step_s) + 1
+    return np.insert(time_s, at, np.nan), np.insert(values, at, np.nan, axis=0)
+
+
+def minutes(ax) -> None:
+    ax.set_xlabel("time from epoch [min]")

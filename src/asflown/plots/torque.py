@@ -1,0 +1,71 @@
+"""Torques over time, with their bands."""
+
+from __future__ import annotations
+
+import textwrap
+
+import numpy as np
+
+from ..estimate.result import AXES, TorqueResult
+from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, new_figure, save
+
+_COLORS = (BLUE, RED, GREEN, ORANGE, PURPLE)
+
+
+def torque_scale(result: TorqueResult) -> tuple[float, str]:
+    """A factor and a unit that suit the torque's size."""
+    if result.relative:
+        return 1.0, "rad/s² per\nunit spin inertia"
+    return (1.0, "N m") if np.nanmax(np.abs(result.torque_Nm), initial=0) > 1 else (1e3, "mN m")
+
+
+def time_scale(time_s) -> tuple[float, str]:
+    """Seconds to minutes, or to hours for long records."""
+    return (3600.0, "h") if len(time_s) and time_s[-1] - time_s[0] > 3 * 3600 else (60.0, "min")
+
+
+def draw_torque(result: TorqueResult, ax, axis: int, *, color=BLUE, label=None, band_sigmas: float = 2.0):
+    """One axis of a torque with its band; lines break where nothing is known. Returns ax."""
+    scale, unit = torque_scale(result)
+    t = result.time_s / time_scale(result.time_s)[0]
+    torque = scale * result.torque_Nm[:, axis]
+    ax.plot(
+        t,
+        torque,
+        color=color,
+        linewidth=1.4 if len(t) < 5000 else 0.6,
+        label=label or f"{result.method}, {result.variant}",
+    )
+    if result.sigma_Nm is not None:
+        s = band_sigmas * scale * result.sigma_Nm[:, axis]
+        ax.fill_between(t, torque - s, torque + s, color=color, alpha=0.18, linewidth=0)
+    ax.set_ylabel(f"torque {AXES[axis]} [{unit}]")
+    return ax
+
+
+def draw_truth(time_s, torque_Nm, ax, label="true torque"):
+    """The torque that was really there, in a simulation, in mN m over minutes. Returns ax."""
+    ax.plot(
+        np.asarray(time_s) / 60, 1e3 * np.asarray(torque_Nm), color=GREY, linewidth=1.2, linestyle="--", label=label
+    )
+    return ax
+
+
+def save_torque_figure(results: list[TorqueResult], path) -> None:
+    """One panel an axis, every result in it, doubts of the first beneath."""
+    axes = results[0].axes
+    figure, panels = new_figure(len(axes), height=2.8 if len(axes) > 1 else 4.0)
+    for j, ax in zip(axes, panels, strict=True):
+        for result, color in zip(results, _COLORS, strict=False):
+            if np.isfinite(result.torque_Nm[:, j]).any():
+                draw_torque(result, ax, j, color=color)
+        ax.axhline(0, color=GREY, linewidth=0.6)
+    if len(results) > 1:
+        panels[0].legend(loc="upper right", fontsize=8, frameon=False)
+    panels[0].set_title(f"Disturbance torque on {results[0].craft}: {results[0].method}, {results[0].variant} (bands: 2 sigma)",
+                        loc="left", fontsize=11)  # fmt: skip
+    panels[-1].set_xlabel(f"time from {results[0].epoch} [{time_scale(results[0].time_s)[1]}]")
+    if results[0].doubts:
+        text = "\n".join(textwrap.fill("DOUBT " + d, 125) for d in results[0].doubts[:4])
+        figure.supxlabel(text, fontsize=6.5, color=RED, x=0.02, ha="left")
+    save(figure, path)

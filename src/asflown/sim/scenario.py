@@ -1,0 +1,331 @@
+"""What is to be flown: a frozen, checked description read from TOML, units in the values.
+
+Times count from the epoch, at which recording starts.  docs/simulator.md lists every key.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
+
+from ..craft.load import in_words
+from ..craft.model import Direction, InertiaElements, Kilogram, Metre, NewtonMetre, Radian, RadianPerSecond, Second, _in
+from ..kit.errors import BadInput, some_of
+from ..kit.quantities import numbers, quantity
+from ..kit.timeline import utc_to_tai_ns
+from ..telemetry.channels import AXES, kind_of
+
+NoiseName = Literal["none", "half", "nominal", "double"]
+
+
+def _series(unit: str):
+    """'0 60 90 s' -> a tuple of any length, SI."""
+
+    def parse(text):
+        count = len(re.findall(r"(?:^|[\s,])[-+]?(?:\d|\.\d)", str(text)))
+        return numbers(text, unit, count)
+
+    return Annotated[tuple[float, ...], BeforeValidator(parse)]
+
+
+def _by_name(unit: str):
+    """{ RWA1 = "600 rpm" } -> SI numbers."""
+
+    def parse(table):
+        if not isinstance(table, dict):
+            raise ValueError('write it as { NAME = "value unit" }')
+        return {name: quantity(text, unit) for name, text in table.items()}
+
+    return Annotated[dict[str, float], BeforeValidator(parse)]
+
+
+TorqueVector, RateVector = _in("N m", 3), _in("rad/s", 3)
+RadianPerSecond2, KilometrePerSecond, Kelvin = _in("rad/s2"), _in("m/s"), _in("K")
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Triangles(_Part):
+    """Repeated triangular pulses about one body axis, alternating in sign (000 section VI)."""
+
+    shape: Literal["triangles"]
+    axis: Literal["x", "y", "z"]
+    peak: NewtonMetre
+    rise: Second
+    first: Second  # start of the first pulse
+    count: int = Field(ge=1)
+
+
+class Constant(_Part):
+    """A constant torque in body axes, such as 001 Appendix A's non-gravitational one."""
+
+    shape: Literal["constant"]
+    torque: TorqueVector
+
+
+class Table(_Part):
+    """A torque about one body axis, linear between instants, zero outside; inline, or columns of a CSV
+    (header ``time [s],x [N m],y [N m],z [N m]``, any of the axes)."""
+
+    shape: Literal["table"]
+    axis: Literal["x", "y", "z"] | None = None
+    times: _series("s") | None = None  # type: ignore[valid-type]
+    torques: _series("N m") | None = None  # type: ignore[valid-type]
+    file: str | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self):
+        inline = (self.axis, self.times, self.torques)
+        if (self.file is None) == all(v is None for v in inline):
+            raise ValueError("give either file, or axis, times and torques")
+        if self.file is None:
+            if any(v is None for v in inline) or len(self.times) != len(self.torques):
+                raise ValueError("axis, times and torques belong together, as many times as torques")
+            if len(self.times) < 2 or min(np.diff(self.times)) <= 0:
+                raise ValueError("times must increase, and there must be two or more")
+        return self
+
+
+class Plume(_Part):
+    """Drag torque of a plume of gas on a straight flyby (004 eqs 21-27, its Tables 2 and 3)."""
+
+    shape: Literal["plume"]
+    flyby: Literal["enceladus-3"] = "enceladus-3"
+    closest_approach: Second
+    axis: Literal["x", "y", "z"] = "z"
+    sign: Literal[-1, 1] = -1
+    exponent: Literal[1, 2] = 1
+
+
+AnyTorque = Annotated[Triangles | Constant | Table | Plume, Field(discriminator="shape")]
+
+
+class Slew(_Part):
+    """A rest-to-rest turn about an axis fixed in the body: constant acceleration, coast, deceleration."""
+
+    start: Second
+    axis: Direction
+    angle: Radian
+    rate: RadianPerSecond = Field(description="largest rate")
+    acceleration: RadianPerSecond2
+
+    @model_validator(mode="after")
+    def _sensible(self):
+        if np.linalg.norm(self.axis) == 0 or self.rate <= 0 or self.acceleration <= 0:
+            raise ValueError("a slew needs an axis, a positive rate and a positive acceleration")
+        return self
+
+
+class CoverMotion(_Part):
+    """A part of the craft turning about its hinge, the angle prescribed by a table of rates.
+
+    The rate is a monotone piecewise cubic through the table (continuous with its slope), scaled by
+    less than 2 % so that the travel is exactly the mechanism's."""
+
+    mechanism: str = "cover"
+    direction: Literal["deploy", "stow"] = "deploy"
+    times: _series("s")  # type: ignore[valid-type]
+    rates: _series("rad/s")  # type: ignore[valid-type]
+    arm: Metre  # hinge to the part's own centre of mass
+    arm_tilt: Radian  # of the arm when stowed, from z, about the hinge axis
+    craft_mass: Kilogram
+    motor_on: Second
+    stall: Second
+    motor_off: Second
+    run_current: _in("A")  # type: ignore[valid-type]
+    stall_current: _in("A")  # type: ignore[valid-type]
+    temperature: Kelvin
+    temperature_rise: Kelvin
+
+    @model_validator(mode="after")
+    def _sensible(self):
+        if len(self.times) != len(self.rates) or len(self.times) < 3 or min(np.diff(self.times)) <= 0:
+            raise ValueError("cover: as many increasing times as rates, three or more")
+        if self.rates[0] != 0 or self.rates[-1] != 0 or min(self.rates) < 0:
+            raise ValueError("cover: the rates start and end at zero and are not negative in between")
+        if not self.motor_on <= self.stall <= self.motor_off:
+            raise ValueError("cover: motor_on, stall and motor_off come in this order")
+        return self
+
+
+class Controller(_Part):
+    """How the flight software is run; its gains are the craft's."""
+
+    period: Second | None = None  # the craft's own unless given
+    delay_cycles: int = Field(default=0, ge=0, le=8)
+    filter: Literal["tustin", "zoh"] = "tustin"
+    inertia: InertiaElements | None = None  # what the controller believes; the true one unless given
+    gyroscopic_feedforward: bool = True
+    friction_compensation: bool = False
+    friction_bandwidth: _in("rad/s") = 0.3  # type: ignore[valid-type]
+
+
+class Gap(_Part):
+    """Samples that never reach the ground; channel is a name, a family ('wheel_rate') or '*'."""
+
+    channel: str = "*"
+    start: Second
+    stop: Second
+
+
+class Sampling(_Part):
+    """What the telemetry holds: the interval of each family of channels; '0 s' leaves one out."""
+
+    wheel_rate: Second = 4.0
+    body_rate: Second = 4.0
+    attitude_error: Second = 2.0
+    rate_error: Second = 0.0
+    controller_rate_error: Second = 0.0
+    quaternion: Second = 4.0
+    control_torque: Second = 0.0
+    wheel_momentum: Second = 0.0
+    wheel_drag_torque: Second = 4.0  # only where the controller estimates it
+    mechanism: Second = 64.0  # cover angle, motor current, temperature and states
+    quantum: dict[str, str] = Field(default_factory=dict)  # family -> one count, with its unit
+    random_phases: bool = False
+    dropout: float = Field(default=0.0, ge=0, lt=1)  # chance of each sample to be lost
+    gaps: tuple[Gap, ...] = ()
+
+    @model_validator(mode="after")
+    def _known(self):
+        for stem in self.quantum:
+            self.count_size(stem)
+        return self
+
+    def count_size(self, stem: str) -> float:
+        if stem not in self.quantum:
+            return 0.0
+        member = {"axis": "_x", "component": "_w", "wheel": "_A", "thruster": "_A"}
+        kind = next((kind_of(stem + m) for m in ("", *member.values()) if _is_channel(stem + m)), None)
+        if kind is None:
+            raise ValueError(f"quantum: {stem!r} is not a family of channels")
+        return quantity(self.quantum[stem], kind.unit)
+
+
+def _is_channel(name: str) -> bool:
+    try:
+        kind_of(name)
+    except BadInput:
+        return False
+    return True
+
+
+class Scenario(_Part):
+    """One flight."""
+
+    name: str = ""
+    description: str = ""
+    craft: str = "cassini"
+    epoch: str = "2015-09-29T00:00:00"  # UTC
+    duration: Second = Field(gt=0)
+    settle: Second = Field(default=0.0, ge=0)  # flown before the epoch, not recorded
+    seed: int = Field(default=1, ge=0)
+    noise: NoiseName = "nominal"
+    substeps: int = Field(default=4, ge=1, le=1000)  # Runge-Kutta steps a control cycle
+    flexible: bool = False
+    friction: bool = False
+    gyro_bias: RateVector = (0.0, 0.0, 0.0)  # what calibration left over
+    wheel_rates: _by_name("rad/s") = Field(default_factory=dict)  # type: ignore[valid-type]
+    torques: tuple[AnyTorque, ...] = ()
+    slews: tuple[Slew, ...] = ()
+    cover: CoverMotion | None = None
+    controller: Controller = Controller()
+    telemetry: Sampling = Sampling()
+    assumptions: tuple[str, ...] = ()
+
+    _written: dict = PrivateAttr(default_factory=dict)
+    _folder: Path = PrivateAttr(default=Path())
+
+    @model_validator(mode="after")
+    def _dated(self):
+        utc_to_tai_ns(self.epoch)
+        return self
+
+    @property
+    def epoch_ns(self) -> int:
+        return int(utc_to_tai_ns(self.epoch))
+
+    @property
+    def folder(self) -> Path:
+        """Where files it names are looked for."""
+        return self._folder
+
+    @property
+    def as_written(self) -> dict:
+        """The TOML's content, changes included: what to keep in order to fly it again."""
+        return self._written
+
+    def changed(self, **changes) -> Scenario:
+        """Another scenario; values as in the TOML: ``duration="60 s"``, ``controller={"delay_cycles": 1}``.
+
+        Tables are merged key by key, lists replaced.  Raises BadInput as ``load_scenario`` does."""
+        return _checked(_merged(self._written, changes), self.name or "scenario", self._folder)
+
+
+def _merged(old: dict, new: dict) -> dict:
+    both = dict(old)
+    for key, value in new.items():
+        deep = isinstance(value, dict) and isinstance(both.get(key), dict)
+        both[key] = _merged(both[key], value) if deep else value
+    return both
+
+
+def _checked(written: dict, where: str, folder: Path) -> Scenario:
+    try:
+        scenario = Scenario.model_validate(written)
+    except BadInput as why:
+        raise BadInput(why.what, file=where, remedy=why.remedy) from why
+    except ValidationError as why:
+        raise BadInput(
+            in_words(why), file=where, remedy="See docs/simulator.md for the keys; every value carries its unit."
+        ) from None
+    scenario._written, scenario._folder = written, folder
+    return scenario
+
+
+def _shipped():
+    return resources.files("asflown.sim") / "scenarios"
+
+
+def shipped_scenarios() -> list[str]:
+    """Names that ``load_scenario`` and ``fly`` take without a file."""
+    return sorted(p.name.removesuffix(".toml") for p in _shipped().iterdir() if p.name.endswith(".toml"))
+
+
+def load_scenario(name_or_path: str | Path) -> Scenario:
+    """A shipped scenario by name, or one from a TOML file.
+
+    Raises BadInput for an unknown name, an unreadable file, an unknown key or a wrong unit."""
+    text, path = str(name_or_path), Path(name_or_path)
+    if path.suffix == ".toml" or "/" in text:
+        if not path.is_file():
+            raise BadInput(
+                "there is no such scenario file",
+                file=path,
+                remedy=f"Give a TOML file, or a shipped scenario: {some_of(shipped_scenarios())}.",
+            )
+        source, folder, name = path.read_bytes(), path.parent, path.name
+    else:
+        if text not in shipped_scenarios():
+            raise BadInput(
+                f"no scenario is named {text!r}",
+                remedy=f"Shipped: {some_of(shipped_scenarios())}. For your own, give the path of a TOML file.",
+            )
+        source, folder, name = (_shipped() / f"{text}.toml").read_bytes(), Path(), text
+    try:
+        written = tomllib.loads(source.decode("utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as why:
+        raise BadInput(f"not a TOML file ({why})", file=name, remedy="Check the syntax near that place.") from why
+    return _checked({"name": path.stem} | written, name, folder)
+
+
+def axis_number(axis: str) -> int:
+    return AXES.index(axis)

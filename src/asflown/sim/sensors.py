@@ -1,0 +1,64 @@
+"""What the instruments add to the truth: one noise table, and one random stream for each sensor."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Noise:
+    """One sigma of everything.  ``NOISE`` holds the published levels."""
+
+    attitude_white_rad: float  # read-out of attitude and attitude error; telemetry only
+    attitude_coloured_rad: float  # error of the on-board estimate, which the controller flies on
+    attitude_time_s: float  # its correlation time: covariance sigma^2 exp(-lag / time)
+    gyro_rad_s: float  # white, on every rate sample
+    wheel_rad_s: float  # white, on every tachometer reading
+
+    def scaled(self, factor: float) -> Noise:
+        return Noise(
+            factor * self.attitude_white_rad,
+            factor * self.attitude_coloured_rad,
+            self.attitude_time_s,
+            factor * self.gyro_rad_s,
+            factor * self.wheel_rad_s,
+        )
+
+
+_NOMINAL = Noise(5e-6, 8e-6, 15.0, 2e-6, 0.005)
+NOISE = {"none": _NOMINAL.scaled(0.0), "half": _NOMINAL.scaled(0.5), "nominal": _NOMINAL, "double": _NOMINAL.scaled(2)}
+
+STAR_TRACKER_PERIOD_S = 1.0
+
+
+def stream(seed: int, sensor: str) -> np.random.Generator:
+    """The random numbers of one sensor.  They depend on the seed and its name only: another sensor
+    more or less changes nothing."""
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(zlib.crc32(sensor.encode()),)))
+
+
+def normal(seed: int, sensor: str, shape, sigma: float) -> np.ndarray:
+    return sigma * stream(seed, sensor).standard_normal(shape)
+
+
+@dataclass(frozen=True)
+class Estimator:
+    """A fixed-gain attitude filter, one axis like another: gyro between star tracker readings."""
+
+    gain: float
+    star_tracker_rad: float
+
+    @classmethod
+    def giving(cls, noise: Noise, period_s: float) -> Estimator:
+        """Gain and star tracker noise for which the error has the stated sigma and correlation time.
+
+        One reading to the next the error goes as x' = (1 - k)(x + g) + k v, with g the gyro's random
+        walk in between: k = 1 - exp(-T / time) sets the correlation, and the variance
+        s^2 (1 - (1 - k)^2) = k^2 var(v) + (1 - k)^2 var(g) the star tracker's noise v."""
+        keep = np.exp(-STAR_TRACKER_PERIOD_S / noise.attitude_time_s)
+        walk = noise.gyro_rad_s**2 * period_s * STAR_TRACKER_PERIOD_S
+        variance = noise.attitude_coloured_rad**2 * (1 - keep**2) - keep**2 * walk
+        return cls(float(1 - keep), float(np.sqrt(max(variance, 0.0)) / (1 - keep)))

@@ -1,0 +1,97 @@
+"""A flight on disk: the telemetry a spacecraft would send, and the truth beside it."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from ..kit.errors import BadInput
+from ..kit.timeline import utc_label
+from ..telemetry.channels import AXES
+from ..telemetry.tables import write_table
+
+
+def write_flight(flight, directory: str | Path) -> dict[str, Path]:
+    """telemetry.csv, truth.csv and truth.json in ``directory``; returns their paths by name.
+
+    Each file appears whole or not at all.  Raises BadInput where the directory cannot be written."""
+    folder = Path(directory)
+    files = {"telemetry": folder / "telemetry.csv", "truth": folder / "truth.csv", "truth_json": folder / "truth.json"}
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_table(flight.telemetry, files["telemetry"])
+        _whole(files["truth"], truth_table(flight))
+        _whole(files["truth_json"], json.dumps(truth_record(flight), indent=1, allow_nan=False) + "\n")
+    except OSError as why:
+        raise BadInput(
+            f"the flight cannot be written there ({why.strerror or why})",
+            file=folder,
+            remedy="Give a directory that can be made and written.",
+        ) from why
+    return files
+
+
+def _whole(path: Path, text: str) -> None:
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def truth_table(flight) -> str:
+    """What really happened at every control instant, as CSV; torques on the body, in body axes."""
+    truth = flight.truth
+    columns = {"time [s]": truth.time_s}
+
+    def add(stem: str, unit: str, values, members) -> None:
+        columns.update({f"{stem}_{m} [{unit}]": values[:, i] for i, m in enumerate(members)})
+
+    add("disturbance_torque", "N m", truth.torque_Nm, AXES)
+    add("body_rate", "rad/s", truth.body_rate_rad_s, AXES)
+    add("wheel_rate", "rad/s", truth.wheel_rate_rad_s, flight.wheels)
+    add("quaternion", "", truth.attitude, ("w", *AXES))
+    add("wheel_momentum", "N m s", truth.wheel_momentum_Nms, AXES)
+    add("momentum_inertial", "N m s", truth.momentum_inertial_Nms, AXES)
+    add("control_torque", "N m", truth.control_torque_Nm, AXES)
+    add("estimation_error", "rad", truth.estimation_error_rad, AXES)
+    if truth.cover_angle_rad is not None:
+        columns["cover_angle [rad]"] = truth.cover_angle_rad
+    head = [
+        f"# truth of scenario {flight.scenario.name}, seed {flight.seed}; {flight.ended}",
+        f"# epoch: {flight.telemetry.epoch_label}",
+        "# torques act on the body, body axes; quaternion scalar first, body to inertial; momentum_inertial is of everything",
+        ",".join(columns),
+    ]
+    rows = np.column_stack(list(columns.values())).tolist()
+    return "\n".join(head + [",".join(map(repr, row)) for row in rows]) + "\n"
+
+
+def truth_record(flight) -> dict:
+    """What was flown: enough to fly it again, and to judge an estimate."""
+    scenario, truth = flight.scenario, flight.truth
+    return {
+        "scenario": scenario.name,
+        "description": scenario.description,
+        "craft": flight.craft.name,
+        "epoch": f"{utc_label(scenario.epoch_ns)} UTC",
+        "seed": flight.seed,
+        "noise": scenario.noise,
+        "ended": flight.ended,
+        "inertia_kg_m2": np.asarray(flight.inertia_kgm2).tolist(),
+        "controller_inertia_kg_m2": None if scenario.controller.inertia is None else list(scenario.controller.inertia),
+        "wheels": list(flight.wheels),
+        "torque_profile": [source.model_dump() for source in scenario.torques],
+        "peaks": [{"time_s": t, "torque_Nm": T, "axis": a} for t, T, a in truth.peaks],
+        "assumptions": list(scenario.assumptions),
+        "doubts": list(flight.doubts),
+        "as_written": scenario.as_written,
+        "versions": {"python": platform.python_version()}
+        | {p: version(p) for p in ("asflown", "numpy", "scipy", "numba")},
+    }

@@ -1,0 +1,172 @@
+"""The attitude against the body rates: does the quaternion turn the way the gyros say?
+
+Rates are differenced from the quaternion under the declared convention and under its alternatives
+(conjugate, other order).  Only a significantly better alternative is refused; where the craft hardly
+moves nothing can be said, and that is said.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..kit.errors import BadInput
+from ..kit.rotations import rates_between
+from ..kit.timeline import NS
+from .channels import AXES
+from .telemetry import BRIDGED, Telemetry
+
+SIGNIFICANT = 14.0  # log-likelihood: odds of a million to one
+BETTER = 1.5  # and by this ratio of squared misfit, which a small timing error does not reach
+COHERENT = 0.9  # part of the motion in common from which scales are compared
+OFF_SCALE = 1.25
+TOO_FAST = 10.0  # times the body rate: no loop does this, a unit does (57 or 1000)
+
+_CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
+_UNITS = {180 / np.pi: "deg/s labelled rad/s", 1e3: "mrad/s labelled rad/s", 30 / np.pi: "rpm labelled rad/s",
+          np.pi / 180: "rad/s labelled deg/s", 1e-3: "rad/s labelled mrad/s", 1e6: "microrad/s labelled rad/s",
+          648_000 / np.pi: "arcsec/s labelled rad/s"}  # fmt: skip
+
+
+def check_attitude(telemetry: Telemetry, readings: dict[str, tuple[np.ndarray, np.ndarray]] | None = None) -> Telemetry:
+    """The same telemetry, with doubts about its quaternion's direction or the rates' scale.
+
+    readings: other readings of the quaternion by name, (tai_ns (N,), q_NB (N, 4)); by default its conjugate.
+    Each reading's differenced rates r are compared with the body rates w up to a free positive factor (a wrong
+    unit is not a wrong direction): misfit S = sum |w - s r|^2, s >= 0; the likelihood of independent residuals
+    of unknown size gives (3 M / 2) ln(S / S'), M reduced by the residuals' own correlation.
+    Raises BadInput where another reading fits significantly better."""
+    telemetry = _error_scale(telemetry)
+    needed = [f"quaternion_{m}" for m in "wxyz"]
+    if not all(n in telemetry for n in needed) or not telemetry.has_axes("body_rate"):
+        return telemetry
+    tai_ns, q = together(telemetry, needed)
+    if readings is None:
+        readings = {"its conjugate": (tai_ns, q * _CONJUGATE)}
+        remedy = (
+            "R(q) must take body vectors to inertial ones: negate quaternion_x, _y and _z, "
+            "or map the columns in a channel dictionary with the direction they have."
+        )
+    else:
+        remedy = "Correct [quaternion] in the channel dictionary."
+    mid_ns, w = _measured(telemetry, tai_ns)
+    if mid_ns is None:
+        return _doubted(
+            telemetry, "quaternion: direction not testable, body rates and attitudes are hardly ever known together"
+        )
+    declared, rate = _residual(tai_ns, q, mid_ns, w)
+    odds = {}
+    for name, (at_ns, other) in readings.items():
+        at = {t: i for i, t in enumerate(at_ns.tolist())}
+        residual, _ = _residual(tai_ns, other[[at[t] for t in tai_ns.tolist()]], mid_ns, w)
+        odds[name] = _log_odds(residual, declared), float(np.sum(declared**2) / max(np.sum(residual**2), 1e-300))
+    best = max(odds, key=lambda n: odds[n][1])
+    if odds[best][0] > SIGNIFICANT and odds[best][1] > BETTER:
+        raise BadInput(
+            f"the quaternion turns against the body rates: {best} leaves {np.sqrt(odds[best][1]):.3g} times smaller "
+            f"residuals (rms {_rms(declared):.3g} rad/s as it is)",
+            channel="quaternion",
+            remedy=remedy,
+        )
+    turned = next(iter(odds))  # the conjugate comes first
+    if odds[turned][0] > -SIGNIFICANT:
+        telemetry = _doubted(
+            telemetry,
+            f"quaternion: direction not testable, the body turns too little (rates of rms {_rms(w):.2g} rad/s)",
+        )
+    return _scales(telemetry, rate, w)
+
+
+def together(telemetry: Telemetry, names: list[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Instants at which all the channels have a usable sample, (N,), and their values, (N, len(names))."""
+    parts = [telemetry.channels[n].usable for n in names]
+    common = parts[0].tai_ns
+    for p in parts[1:]:
+        common = np.intersect1d(common, p.tai_ns, assume_unique=True)
+    return common, np.stack([p.values[np.searchsorted(p.tai_ns, common)] for p in parts], axis=1)
+
+
+def _measured(telemetry: Telemetry, tai_ns: np.ndarray):
+    """Body rates at the middle of each step between attitudes, where both are known without a gap."""
+    at_ns, w = together(telemetry, [f"body_rate_{a}" for a in AXES])
+    if len(tai_ns) < 10 or len(at_ns) < 10:
+        return None, None
+    step, cadence = np.diff(tai_ns), np.median(np.diff(at_ns))
+    mid_ns = tai_ns[:-1] + step // 2
+    after = np.clip(np.searchsorted(at_ns, mid_ns), 1, len(at_ns) - 1)
+    near = (at_ns[after] - at_ns[after - 1] <= (BRIDGED + 1.5) * cadence) & (mid_ns >= at_ns[0]) & (mid_ns <= at_ns[-1])
+    near &= step <= (BRIDGED + 1.5) * np.median(step)
+    if near.sum() < 10:
+        return None, None
+    x = (mid_ns - at_ns[0]) / NS
+    known = np.stack([np.interp(x, (at_ns - at_ns[0]) / NS, w[:, k]) for k in range(3)], axis=1)
+    return near, known[near]
+
+
+def _residual(tai_ns, q, near, w) -> tuple[np.ndarray, np.ndarray]:
+    """Body rates less those of the quaternion times the best positive factor; and those of the quaternion."""
+    _, rate = rates_between((tai_ns - tai_ns[0]) / NS, q)
+    rate = rate[near]
+    size = float(np.sum(rate**2))
+    factor = max(0.0, float(np.sum(w * rate))) / size if size > 0 else 0.0
+    return w - factor * rate, rate
+
+
+def _log_odds(residual: np.ndarray, declared: np.ndarray) -> float:
+    """Log-likelihood of a reading over the declared one."""
+    better = min(residual, declared, key=lambda r: float(np.sum(r**2)))
+    total = float(np.sum(better**2))
+    rho = float(np.sum(better[1:] * better[:-1])) / total if total > 0 else 0.0
+    rho = min(max(rho, 0.0), 0.99)
+    count = better.size * (1 - rho) / (1 + rho)
+    return count / 2 * float(np.log(max(np.sum(declared**2), 1e-300) / max(np.sum(residual**2), 1e-300)))
+
+
+def _error_scale(telemetry: Telemetry) -> Telemetry:
+    """Doubt the attitude error's unit where it changes many times faster than the body turns.
+
+    In a hold de/dt = -w.  Its slope against w is compared with a clear excess only: while the command
+    moves the error follows the motion less, never more."""
+    names = [f"attitude_error_{a}" for a in AXES]
+    if not all(n in telemetry for n in names) or not telemetry.has_axes("body_rate"):
+        return telemetry
+    tai_ns, e = together(telemetry, names)
+    near, w = _measured(telemetry, tai_ns)
+    if near is None:
+        return telemetry
+    change = np.diff(e, axis=0)[near] / (np.diff(tai_ns)[near] / NS)[:, None]
+    size = float(np.sum(w**2))
+    if size == 0:
+        return telemetry
+    slope = float(np.sum(change * w)) / size
+    error = float(np.sqrt(np.sum((change - slope * w) ** 2) / (w.size * size)))
+    if abs(slope) - 5 * error < TOO_FAST:
+        return telemetry
+    return _doubted(
+        telemetry,
+        f"{', '.join(names)}: changes {abs(slope):.3g} times as fast as the body turns: "
+        f"are the values mrad or deg labelled {telemetry.channels[names[0]].unit_given or 'rad'}?",
+    )
+
+
+def _scales(telemetry: Telemetry, rate: np.ndarray, w: np.ndarray) -> Telemetry:
+    """Doubt a unit where rates and attitude move together but not by the same amount."""
+    common = float(np.sum(w * rate))
+    if common <= 0 or common**2 < COHERENT * float(np.sum(w**2)) * float(np.sum(rate**2)):
+        return telemetry
+    scale = common / float(np.sum(rate**2))
+    if 1 / OFF_SCALE < scale < OFF_SCALE:
+        return telemetry
+    near = [u for f, u in _UNITS.items() if abs(np.log(scale / f)) < np.log(OFF_SCALE)]
+    guess = f": are they {near[0]}?" if near else ": check the unit of the body rates"
+    names = ", ".join(f"body_rate_{a}" for a in AXES)
+    return _doubted(telemetry, f"{names}: {scale:.4g} times the rates of the quaternion{guess}")
+
+
+def _rms(x: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.sum(x**2, axis=1))))
+
+
+def _doubted(telemetry: Telemetry, doubt: str) -> Telemetry:
+    return replace(telemetry, doubts=(*telemetry.doubts, doubt))

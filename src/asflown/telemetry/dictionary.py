@@ -1,0 +1,374 @@
+"""Channel dictionaries: any table's columns renamed, scaled and turned to house conventions, once.
+
+A dictionary is TOML; unknown keys are refused and columns it does not mention are left aside.
+
+    [time]                       column, format ("s", "utc", "gps s", "et s", "unix s"), epoch (UTC, for "s"),
+                                 labels = [further time columns, kept as written]
+    [[channel]]                  column, name, unit; scale and offset: value = (cell * scale + offset) [unit];
+                                 count = "0.4 rpm": the size of one count (with unit = "count" cells are counts);
+                                 wrap = "65536 count" or "360 deg": the modulus at which cells wrap
+    [quaternion]                 columns (4), order, handedness, direction, frame
+    [orbit]                      position (3 columns), position_unit, velocity (3 columns), velocity_unit
+    [long]                       channel, value (columns); the [[channel]] columns are then names in the first
+    [notes]                      free text
+
+The quaternion.  ``order`` says where the scalar stands.  ``handedness`` says whose formula makes the matrix
+R(q): Hamilton's (i j = k, R(q) v = q v q*) or JPL's (i j = -k, the transpose of Hamilton's for the same
+numbers).  ``direction`` says what that R(q) does to components: "body-to-frame" takes those in body axes to
+those in the frame, "frame-to-body" the reverse.  ``frame`` is "inertial", or "lvlh" (z to the planet, y against
+the orbit normal, x along the velocity), whose turning with the orbit is then removed.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from ..kit.errors import BadInput, some_of
+from ..kit.quantities import quantity
+from ..kit.rotations import lvlh_to_inertial, quaternion, rotation
+from ..kit.timeline import NS
+from .channels import AXES, kind_of, split_header, to_si
+from .load import Read, Use, assembled
+from .tables import Table, divided, numbers_of
+from .telemetry import Channel, Finding
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class TimeColumn(_Part):
+    column: str
+    format: Literal["s", "utc", "gps s", "et s", "unix s"] = "s"
+    epoch: str | None = None
+    labels: tuple[str, ...] = ()
+
+
+class ChannelEntry(_Part):
+    column: str
+    name: str
+    unit: str = ""
+    scale: float = Field(1.0, allow_inf_nan=False)
+    offset: float = Field(0.0, allow_inf_nan=False)
+    count: str = ""
+    wrap: str = ""
+    note: str = ""
+
+
+_Columns4 = Annotated[tuple[str, ...], Field(min_length=4, max_length=4)]
+_Columns3 = Annotated[tuple[str, ...], Field(min_length=3, max_length=3)]
+
+
+class QuaternionEntry(_Part):
+    columns: _Columns4
+    order: Literal["scalar-first", "scalar-last"]
+    handedness: Literal["hamilton", "jpl"] = "hamilton"
+    direction: Literal["body-to-frame", "frame-to-body"]
+    frame: Literal["inertial", "lvlh"] = "inertial"
+
+    def house(self, q: np.ndarray, *, turned: bool = False, reordered: bool = False) -> np.ndarray:
+        """Columns as written, (N, 4), to scalar-first Hamilton, body to frame; or under another reading."""
+        last = (self.order == "scalar-last") != reordered
+        q = np.roll(q, 1, axis=1) if last else q
+        # JPL's matrix is the transpose of Hamilton's: it undoes one reversal
+        conjugate = (self.direction == "frame-to-body") != (self.handedness == "jpl")
+        return q * (np.array([1, -1, -1, -1]) if conjugate != turned else 1)
+
+
+class OrbitEntry(_Part):
+    position: _Columns3
+    position_unit: str
+    velocity: _Columns3
+    velocity_unit: str
+
+
+class LongEntry(_Part):
+    channel: str
+    value: str
+
+
+class ChannelDictionary(_Part):
+    """What the columns of one kind of file are."""
+
+    time: TimeColumn
+    channel: tuple[ChannelEntry, ...] = ()
+    quaternion: QuaternionEntry | None = None
+    orbit: OrbitEntry | None = None
+    long: LongEntry | None = None
+    notes: dict[str, str] = Field(default_factory=dict)
+
+
+def load_dictionary(path) -> ChannelDictionary:
+    """Read and check a dictionary.  Raises BadInput for a missing file, an unknown key, name or unit."""
+    path = Path(path)
+    try:
+        if not path.is_file():
+            raise BadInput("there is no such channel dictionary", remedy="Give a TOML file; examples/ holds some.")
+        try:
+            entry = ChannelDictionary.model_validate(tomllib.loads(path.read_text("utf-8")))
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as why:
+            raise BadInput(f"not a TOML file ({why})", remedy="Check the syntax near that place.") from None
+        except ValidationError as why:
+            raise BadInput(in_words(why), remedy="docs/telemetry.md lists the keys of a channel dictionary.") from None
+        _check(entry)
+    except BadInput as why:
+        if why.file is not None:
+            raise
+        raise BadInput(why.what, remedy=why.remedy, file=path, channel=why.channel) from None
+    return entry
+
+
+def in_words(why: ValidationError) -> str:
+    said = []
+    for e in why.errors()[:5]:
+        where = ".".join(str(p) for p in e["loc"])
+        said.append(f"{where}: {'unknown key' if e['type'] == 'extra_forbidden' else e['msg']}")
+    return "; ".join(said) + (f"; and {len(why.errors()) - 5} more" if len(why.errors()) > 5 else "")
+
+
+def _check(entry: ChannelDictionary) -> None:
+    """What the shape alone cannot say: names, units, and nothing mapped twice."""
+    columns = [c.column for c in entry.channel]
+    names = [c.name for c in entry.channel]
+    if entry.quaternion:
+        columns += entry.quaternion.columns
+        names += [f"quaternion_{m}" for m in "wxyz"]
+    if entry.orbit:
+        columns += [*entry.orbit.position, *entry.orbit.velocity]
+        names += [f"orbit_{p}_{a}" for p in ("position", "velocity") for a in AXES]
+    if not columns:
+        raise BadInput("the dictionary maps no column", remedy="Add [[channel]] entries with column, name and unit.")
+    for what, those in (("column", columns), ("channel", names)):
+        twice = sorted({t for t in those if those.count(t) > 1})
+        if twice:
+            raise BadInput(f"a {what} is mapped twice: {some_of(twice)}", remedy="Map it once.")
+    if entry.quaternion and entry.quaternion.frame == "lvlh" and entry.orbit is None:
+        raise BadInput("a quaternion in LVLH needs the orbit", remedy="Add [orbit] with position and velocity columns.")
+    for use in _uses(entry, {c: 0 for c in columns}):
+        to_si(use.name, use.unit)
+
+
+def _uses(entry: ChannelDictionary, at: dict[str, int]) -> list[Use]:
+    """The columns present in one table, as channels in their units."""
+    uses = []
+    for c in entry.channel:
+        if c.column not in at:
+            continue
+        unit, scale, offset, size = c.unit, c.scale, c.offset, 0.0
+        si = kind_of(c.name).unit
+        if c.count:
+            size = quantity(c.count, si)
+        if c.unit == "count" and si != "":
+            if not size:
+                raise BadInput(
+                    "cells in counts need the size of one", channel=c.name, remedy='Add count = "0.4 rpm", with a unit.'
+                )
+            unit, scale, offset = si, scale * size, offset * size
+        wrap = 0.0
+        if c.wrap:
+            number, _, wrap_unit = c.wrap.strip().partition(" ")
+            # a modulus in counts is one of cells: it scales as they do
+            counts = wrap_unit.strip() in ("count", "counts")
+            wrap = abs(scale) * to_si(c.name, unit)[0] * quantity(number, "") if counts else quantity(c.wrap, si)
+            if not wrap > 0:
+                raise BadInput(
+                    "a modulus is positive", channel=c.name, remedy='Write wrap = "65536 count" or "360 deg".'
+                )
+        uses.append(Use(at[c.column], c.name, unit, scale, offset, size, wrap))
+    if entry.orbit:
+        for stem, columns, unit in (
+            ("orbit_position", entry.orbit.position, entry.orbit.position_unit),
+            ("orbit_velocity", entry.orbit.velocity, entry.orbit.velocity_unit),
+        ):
+            uses += [Use(at[c], f"{stem}_{a}", unit) for c, a in zip(columns, AXES, strict=True) if c in at]
+    return uses
+
+
+def translated(tables: list[Table], entry: ChannelDictionary) -> Read:
+    """The tables' columns as channels in house names, units and conventions.
+
+    Raises BadInput for a column of the dictionary that no table has."""
+    if entry.long:
+        tables = [part for t in tables for part in _divided(t, entry.time, entry.long)]
+    missing = _wanted(entry) - {n for t in tables for n in _columns_of(t)}
+    if missing:
+        there = dict.fromkeys(h for t in tables for h in t.headings)
+        raise BadInput(
+            f"columns of the dictionary are not in the file: {some_of(sorted(missing))}",
+            remedy=f"The file's columns: {some_of(there)}.",
+        )
+    parts, ignored = [], []
+    for table in tables:
+        at = _columns_of(table)
+        if entry.time.column not in at:
+            continue
+        uses = _uses(entry, at)
+        clocks = [at[c] for c in entry.time.labels if c in at]
+        parts.append((table, at[entry.time.column], entry.time.format, uses, clocks))
+        known = _wanted(entry) | {entry.time.column}
+        ignored += [h for h in table.headings if not {h, _bare(h)} & known]
+    read = assembled(parts, entry.time.epoch if entry.time.format == "s" else None)
+    if entry.quaternion:
+        _add_quaternion(read, parts, entry.quaternion)
+    if ignored:
+        detail = f"columns the dictionary does not mention: {some_of(dict.fromkeys(ignored))}"
+        read.findings.append(Finding("", "ignored", len(set(ignored)), read.epoch_ns, detail))
+    return read
+
+
+def _wanted(entry: ChannelDictionary) -> set[str]:
+    wanted = {c.column for c in entry.channel} | {entry.time.column, *entry.time.labels}
+    if entry.quaternion:
+        wanted |= set(entry.quaternion.columns)
+    if entry.orbit:
+        wanted |= {*entry.orbit.position, *entry.orbit.velocity}
+    return wanted
+
+
+def _columns_of(table: Table) -> dict[str, int]:
+    """Where each column stands, by its heading as written or without its unit."""
+    bare = {_bare(h): j for j, h in enumerate(table.headings)}
+    return bare | {h: j for j, h in enumerate(table.headings)}
+
+
+def _bare(heading: str) -> str:
+    return (split_header(heading) or (heading,))[0]
+
+
+def _divided(table: Table, time: TimeColumn, long: LongEntry) -> list[Table]:
+    at = _columns_of(table)
+    absent = [c for c in (time.column, long.channel, long.value) if c not in at]
+    if absent:
+        raise BadInput(
+            f"columns of the dictionary are not in the file: {some_of(absent)}",
+            remedy=f"The file's columns: {some_of(table.headings)}.",
+        )
+    return divided(table, at[time.column], at[long.channel], at[long.value], None)
+
+
+# ---- the quaternion -------------------------------------------------------------------------------
+
+
+def _add_quaternion(read: Read, parts, said: QuaternionEntry) -> None:
+    """The quaternion in house convention, and what it would be under the other readings (for ``attitude``)."""
+    tai_ns, q = _raw_quaternion(read, parts, said.columns)
+    frame = None
+    if said.frame == "lvlh":
+        known, frame = _frame_at(read.channels, tai_ns)
+        if not known.all():
+            first = int(tai_ns[~known][0])
+            read.findings.append(
+                Finding("quaternion_w", "orbit", int((~known).sum()), first, "quaternions without the orbit, left out")
+            )
+        if not known.any():
+            raise BadInput(
+                "the orbit is nowhere known where the quaternion is", channel="quaternion", remedy="Check [orbit]."
+            )
+        tai_ns, q = tai_ns[known], q[known]
+
+    def inertial(**other):
+        house = said.house(q, **other)
+        return house if frame is None else quaternion(frame * rotation(house)) * np.linalg.norm(q, axis=1)[:, None]
+
+    house = inertial()
+    for j, m in enumerate("wxyz"):
+        read.channels[f"quaternion_{m}"] = Channel(f"quaternion_{m}", tai_ns, house[:, j], np.ones(len(q), bool))
+    other_way = "frame-to-body" if said.direction == "body-to-frame" else "body-to-frame"
+    other_order = "scalar-last" if said.order == "scalar-first" else "scalar-first"
+    read.readings = {
+        f'direction = "{other_way}"': (tai_ns, inertial(turned=True)),
+        f'order = "{other_order}"': (tai_ns, inertial(reordered=True)),
+        f'direction = "{other_way}" and order = "{other_order}"': (tai_ns, inertial(turned=True, reordered=True)),
+    }
+
+
+def _raw_quaternion(read: Read, parts, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Instants at which all four columns were sampled, and their numbers as written."""
+    found = {}
+    for (table, *_), tai_ns in zip(parts, read.row_times_ns, strict=True):
+        at = _columns_of(table)
+        for c in names:
+            if c not in at:
+                continue
+            rows, values, _ = numbers_of(table, at[c], c)
+            found[c] = (tai_ns[rows], values)
+    columns = [found[c] for c in names]
+    common = columns[0][0]
+    for t, _ in columns[1:]:
+        common = np.intersect1d(common, t)
+    if len(common) == 0:
+        raise BadInput(
+            "the four columns are never sampled together", channel="quaternion", remedy="Check [quaternion]."
+        )
+    # file order is kept, so that disorder and duplicates are seen by the screening
+    kept = [(t[np.isin(t, common)], v[np.isin(t, common)]) for t, v in columns]
+    if any(len(t) != len(kept[0][0]) or (t != kept[0][0]).any() for t, _ in kept):
+        once = [np.unique(t, return_index=True) for t, _ in kept]
+        return once[0][0], np.stack([v[i] for (_, i), (_, v) in zip(once, kept, strict=True)], axis=1)
+    q = np.stack([v for _, v in kept], axis=1)
+    whole = np.linalg.norm(q, axis=1) > 0.5  # a quaternion of zeros is a packet not filled in
+    if not whole.all():
+        first = int(kept[0][0][~whole][0])
+        read.findings.append(
+            Finding("quaternion_w", "norm", int((~whole).sum()), first, "quaternions of zeros, left out")
+        )
+    if not whole.any():
+        raise BadInput("every quaternion is zero", channel="quaternion", remedy="Check [quaternion].")
+    return kept[0][0][whole], q[whole]
+
+
+#: Orbit angle between known positions: a cubic with given slopes errs by (angle)^4 / 384, here 3e-7.
+_WIDEST_STEP_RAD = 0.1
+
+
+def _moves_as_it_says(t, r, v) -> np.ndarray:
+    """Samples whose position fits its neighbours' by the velocity, to 5 %: others carry a wrong time."""
+    dt = np.diff(t)[:, None]
+    miss = np.linalg.norm(np.diff(r, axis=0) - dt * (v[:-1] + v[1:]) / 2, axis=1)
+    way = dt[:, 0] * np.linalg.norm(v[1:], axis=1)
+    far = np.linalg.norm(np.diff(r, axis=0), axis=1) > 0.5 * np.linalg.norm(
+        r[1:], axis=1
+    )  # too far apart for a chord to tell
+    fits = np.concatenate(([True], (miss < 0.05 * way) | far, [True]))
+    return fits[:-1] & fits[1:]
+
+
+def _frame_at(channels: dict[str, Channel], tai_ns: np.ndarray):
+    """LVLH to inertial at the attitude's instants: (known (N,), rotation of the known ones)."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    parts = [channels[f"orbit_{p}_{a}"] for p in ("position", "velocity") for a in AXES]
+    common = parts[0].tai_ns
+    for p in parts[1:]:
+        common = np.intersect1d(common, p.tai_ns)
+    columns = []
+    for p in parts:
+        order = np.unique(p.tai_ns, return_index=True)
+        columns.append(p.values[order[1][np.isin(order[0], common)]])
+    state = np.stack(columns, axis=1)
+    fresh = np.concatenate(([True], np.any(np.diff(state, axis=0) != 0, axis=1)))  # a held position is an old one
+    at, state = common[fresh], state[fresh]
+    sound = _moves_as_it_says((at - at[:1]) / NS, state[:, :3], state[:, 3:])
+    at, r, v = at[sound], state[sound, :3], state[sound, 3:]
+    if len(at) < 2:
+        raise BadInput(
+            "the orbit's position does not move with its velocity",
+            channel="orbit_position",
+            remedy="Check position_unit and velocity_unit in [orbit], and that both are in inertial axes.",
+        )
+    t0 = at[0]
+    after = np.clip(np.searchsorted(at, tai_ns), 1, len(at) - 1)
+    step = (at[after] - at[after - 1]) / NS
+    turned = step * np.linalg.norm(v[after], axis=1) / np.linalg.norm(r[after], axis=1)
+    known = (tai_ns >= at[0]) & (tai_ns <= at[-1]) & (turned < _WIDEST_STEP_RAD)
+    if not known.any():
+        return known, None
+    # slopes: velocity, and the acceleration of a circular orbit
+    pull = -r * (np.sum(v**2, axis=1) / np.sum(r**2, axis=1))[:, None]
+    x, s = (at - t0) / NS, (tai_ns[known] - t0) / NS
+    return known, lvlh_to_inertial(CubicHermiteSpline(x, r, v)(s), CubicHermiteSpline(x, v, pull)(s))

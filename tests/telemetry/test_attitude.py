@@ -1,0 +1,92 @@
+"""The quaternion against the body rates: refused only where the reverse fits significantly better."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import flight_data
+from telemetry.flights import noise, slewing, telemetry_of
+
+from asflown.kit.errors import BadInput
+from asflown.telemetry.attitude import check_attitude
+from asflown.telemetry.load import load_telemetry
+from asflown.telemetry.screening import screen
+
+
+def conjugated(t):
+    vector = {
+        n: replace(t.channels[n], values=-t.channels[n].values)
+        for n in ("quaternion_x", "quaternion_y", "quaternion_z")
+    }
+    return replace(t, channels=t.channels | vector)
+
+
+def test_right_direction_in_a_slew_is_confirmed_and_the_wrong_one_refused():
+    t = slewing()
+    assert check_attitude(t).doubts == ()
+    with pytest.raises(BadInput, match="turns against the body rates"):
+        check_attitude(conjugated(t))
+
+
+def test_a_change_of_sign_is_no_change_of_direction():
+    t = slewing()
+    flip = np.where(np.arange(240) % 7 < 3, -1.0, 1.0)
+    t = replace(
+        t,
+        channels=t.channels
+        | {
+            f"quaternion_{m}": replace(
+                t.channels[f"quaternion_{m}"], values=flip * t.channels[f"quaternion_{m}"].values
+            )
+            for m in "wxyz"
+        },
+    )
+    assert check_attitude(t).doubts == ()
+    with pytest.raises(BadInput):
+        check_attitude(conjugated(t))
+
+
+def test_inertial_hold_is_not_testable_whichever_way():
+    at = np.arange(400.0)
+    q = np.tile([0.5, 0.5, -0.5, 0.5], (400, 1)) + noise(1600, 3e-6).reshape(400, 4)
+    columns = {f"body_rate_{a}": (at, noise(400, 2e-6, k)) for k, a in enumerate("xyz")}
+    t = telemetry_of(**columns, **{f"quaternion_{m}": (at, q[:, k]) for k, m in enumerate("wxyz")})
+    for either in (t, conjugated(t)):
+        assert len(check_attitude(either).doubts) == 1
+        assert "direction not testable" in check_attitude(either).doubts[0]
+
+
+@pytest.mark.parametrize(("scale", "unit"), [(180 / np.pi, "deg/s"), (1e3, "mrad/s"), (1e-3, "labelled mrad/s")])
+def test_rates_in_another_unit_are_doubted_and_the_direction_still_told(scale, unit):
+    doubts = check_attitude(slewing(rate_scale=scale)).doubts
+    assert len(doubts) == 1 and doubts[0].startswith("body_rate_x, body_rate_y") and unit in doubts[0]
+    with pytest.raises(BadInput, match="turns against"):
+        check_attitude(conjugated(slewing(rate_scale=scale)))
+
+
+def test_telemetry_without_attitude_or_rates_passes():
+    t = telemetry_of(body_rate_x=(np.arange(9.0), np.zeros(9)))
+    assert check_attitude(t) is t
+
+
+@pytest.mark.parametrize(
+    "run", ["torque1", "torque2", "torque1_flex", "cover", "slew", "slew_ext", "bias", "bias_fsds"]
+)
+def test_runs_of_another_simulator_pass_unharmed(run):
+    t = load_telemetry(flight_data(f"simulated/{run}.csv.gz"))
+    assert t.findings == () and all(c.valid.all() for c in t.channels.values())
+    assert all("direction not testable" in d for d in t.doubts)
+    if run.startswith("slew"):
+        assert t.doubts == ()
+        with pytest.raises(BadInput, match="turns against"):
+            check_attitude(screen(conjugated(t)))
+
+
+@pytest.mark.parametrize("run", ["torque1", "cover", "bias"])
+def test_attitude_error_in_mrad_labelled_rad_is_doubted(run):
+    t = load_telemetry(flight_data(f"simulated/{run}.csv.gz"))
+    for factor, doubted in ((1.0, False), (180 / np.pi, True), (1e3, True)):
+        names = [f"attitude_error_{a}" for a in "xyz"]
+        scaled = {n: replace(t.channels[n], values=factor * t.channels[n].values) for n in names}
+        doubts = check_attitude(replace(t, channels=t.channels | scaled, doubts=())).doubts
+        assert any(d.startswith("attitude_error_x") for d in doubts) == doubted
