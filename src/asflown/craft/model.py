@@ -8,7 +8,7 @@ products of inertia), about the centre of mass.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
@@ -18,19 +18,39 @@ from ..kit.quantities import numbers, quantity
 from ..kit.timeline import utc_label, utc_to_tai_ns
 
 
-def _in(unit: str, count: int = 0):
+def _in(unit: str, count: int = 0) -> Any:
     """A field written as text with a unit, kept as SI."""
     parse = (lambda v: numbers(v, unit, count)) if count else (lambda v: quantity(v, unit))
-    kind = tuple[(float,) * count] if count else float
+    kind: Any = tuple[(float,) * count] if count else float
     return Annotated[kind, BeforeValidator(parse)]
 
 
-Kilogram, Second, Newton, Hertz = _in("kg"), _in("s"), _in("N"), _in("Hz")
-KilogramMetre2, NewtonMetre, Radian, RadianPerSecond = _in("kg m2"), _in("N m"), _in("rad"), _in("rad/s")
-Metre, Metre2, MetrePerSecond = _in("m"), _in("m2"), _in("m/s")
-MetreVector, Direction = _in("m", 3), _in("", 3)
-InertiaElements, InertiaRatio = _in("kg m2", 6), _in("", 6)
-NewtonMetreSecond = _in("N m s")
+if TYPE_CHECKING:  # what the values are once loaded
+    Kilogram = float
+    Second = float
+    Newton = float
+    Hertz = float
+    KilogramMetre2 = float
+    NewtonMetre = float
+    NewtonMetreSecond = float
+    Radian = float
+    RadianPerSecond = float
+    Metre = float
+    Metre2 = float
+    MetrePerSecond = float
+    ViscousDrag = float
+    MetreVector = tuple[float, float, float]
+    Direction = tuple[float, float, float]
+    ModeCoupling = tuple[float, float, float]
+    InertiaElements = tuple[float, float, float, float, float, float]
+    InertiaRatio = tuple[float, float, float, float, float, float]
+else:  # how they are written
+    Kilogram, Second, Newton, Hertz = _in("kg"), _in("s"), _in("N"), _in("Hz")
+    KilogramMetre2, NewtonMetre, NewtonMetreSecond = _in("kg m2"), _in("N m"), _in("N m s")
+    Radian, RadianPerSecond, ViscousDrag = _in("rad"), _in("rad/s"), _in("N m s / rad")
+    Metre, Metre2, MetrePerSecond = _in("m"), _in("m2"), _in("m/s")
+    MetreVector, Direction, ModeCoupling = _in("m", 3), _in("", 3), _in("kg(1/2) m", 3)
+    InertiaElements, InertiaRatio = _in("kg m2", 6), _in("", 6)
 
 
 def _spin_inertia(value):
@@ -101,7 +121,7 @@ class PropellantUsed(_Data):
 class Drag(_Data):
     """A wheel's bearing drag.  Assumed values unless a source says otherwise."""
 
-    viscous: _in("N m s / rad") = 0.0  # type: ignore[valid-type]
+    viscous: ViscousDrag = 0.0
     coulomb: NewtonMetre = 0.0
     stiction: NewtonMetre = 0.0
     source: str = ""
@@ -197,7 +217,7 @@ class Mechanism(_Data):
 
     def inertia_about_craft(self) -> np.ndarray:
         """Its part of the craft's tensor: I_own + m (L.L 1 - L L^T)  (braces of 000 eqs 4a-c)."""
-        L = np.asarray(self.from_cm)
+        L = np.array(self.from_cm, float)
         return tensor(self.inertia) + self.mass * (L @ L * np.eye(3) - np.outer(L, L))
 
 
@@ -207,7 +227,7 @@ class FlexibleMode(_Data):
     name: str
     frequency: Hertz
     damping: float
-    coupling: _in("kg(1/2) m", 3)  # type: ignore[valid-type]
+    coupling: ModeCoupling
     source: str = ""
 
 

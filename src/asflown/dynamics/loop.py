@@ -11,27 +11,20 @@ with e = commanded minus estimated attitude and T the torque on the body.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from scipy import linalg, signal
 
-
-class Gains(Protocol):
-    """What this module asks of a controller; asflown.craft's WheelController has it."""
-
-    kp_per_s: float
-    kd_per_s: float
-    rate_filter: object
+from ..craft.model import WheelController
 
 
-def filter_section(controller: Gains) -> np.ndarray:
+def filter_section(controller: WheelController) -> np.ndarray:
     """s^2 + 2 z w s + w^2 of the rate filter, highest power first."""
     f = controller.rate_filter
     return np.array([1.0, 2 * f.damping * f.natural_frequency, f.natural_frequency**2])
 
 
-def denominator(controller: Gains, variant: str = "corrected") -> np.ndarray:
+def denominator(controller: WheelController, variant: str = "corrected") -> np.ndarray:
     """Den(s) of 000 eq 11b, coefficients of s^6 … s^0.
 
     ERR in print (000 eq 11b and 004 eq 4): the s^4 coefficient reads 4 w^2 z^2 + 2 w^2 + 4 KP KD;
@@ -46,13 +39,13 @@ def denominator(controller: Gains, variant: str = "corrected") -> np.ndarray:
     return den
 
 
-def error_per_torque(controller: Gains, inertia_kgm2: float, variant: str = "corrected"):
+def error_per_torque(controller: WheelController, inertia_kgm2: float, variant: str = "corrected"):
     """Numerator and denominator of e/T, the closed loop of 000 eq 11a. [rad / N m]"""
     section = filter_section(controller)
     return -np.polymul(section, section) / inertia_kgm2, denominator(controller, variant)
 
 
-def wheel_momentum_rate_per_torque(controller: Gains):
+def wheel_momentum_rate_per_torque(controller: WheelController):
     """Numerator and denominator of (dh/dt)/T: what the wheels take up of a disturbance torque.
 
     h is the wheel momentum about the axis, dh/dt = -(control torque).  Neglecting I w (000 eq 6)
@@ -72,17 +65,17 @@ class SecondOrder:
     stiffness_per_s2: float
 
 
-def low_order(controller: Gains) -> SecondOrder:
+def low_order(controller: WheelController) -> SecondOrder:
     """The filter left out (000 eqs 14-16, 004 eq 5)."""
     return SecondOrder(1.0, controller.kd_per_s, controller.kp_per_s * controller.kd_per_s)
 
 
-def hankel_singular_values(controller: Gains) -> np.ndarray:
+def hankel_singular_values(controller: WheelController) -> np.ndarray:
     """Hankel singular values of -I e/T, largest first. [s^2]"""
     return _balanced(controller)[0]
 
 
-def hankel_order_two(controller: Gains) -> SecondOrder:
+def hankel_order_two(controller: WheelController) -> SecondOrder:
     """Balanced truncation of the sixth-order loop to two states (the way of 004 eqs 9, 10).
 
     Those equations are not in the transcription; recomputed here.  The truncated numerator has a
@@ -92,7 +85,7 @@ def hankel_order_two(controller: Gains) -> SecondOrder:
     return SecondOrder(float(num[0, 2]), float(den[1]), float(den[2]))
 
 
-def _balanced(controller: Gains):
+def _balanced(controller: WheelController):
     num, den = error_per_torque(controller, 1.0)
     A, B, C, _ = signal.tf2ss(-num, den)
     # a companion form is badly scaled: balance it before the Gramians
@@ -111,7 +104,7 @@ def _root(gramian):
     return V * np.sqrt(np.maximum(w, 0))
 
 
-def filtered_rate(controller: Gains, rate: np.ndarray, step_s: float) -> np.ndarray:
+def filtered_rate(controller: WheelController, rate: np.ndarray, step_s: float) -> np.ndarray:
     """F(s) applied to an evenly sampled rate (linear between samples), at rest at its first value."""
     section = filter_section(controller)
     A, B, C, D = signal.tf2ss([section[-1]], section)

@@ -25,6 +25,8 @@ def actuation_summary(telemetry: Telemetry, momentum: TorqueResult, against: Com
     ``momentum``: the printed momentum torque about one axis; ``against``: the transfer torque set
     against it."""
     j = momentum.axes[0]
+    if momentum.momentum_Nms is None:
+        raise ValueError("the summary needs a momentum torque")
     h = momentum.momentum_Nms[:, j]
     late = momentum.time_s > SECOND_PHASE_S
     ratios = [r for t, r in zip(against.peak_times_s, against.ratios, strict=True) if t > SECOND_PHASE_S]

@@ -88,7 +88,7 @@ class TorqueResult:
         """The JSON form, without command and provenance."""
         names = ("torque_Nm", "sigma_Nm", "momentum_Nms")
         values = {n: self.column(getattr(self, n)) for n in names}
-        peaks = [
+        peaks: list[dict] = [
             {"time_s": p.time_s, "torque_Nm": p.torque_Nm} | ({"axis": p.axis} if self.axis == "all" else {})
             for p in self.peaks
         ]

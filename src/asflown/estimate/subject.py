@@ -76,11 +76,11 @@ def subject_of(telemetry: Telemetry, craft: Craft, moving: str | None = "auto") 
     for name in telemetry.members("wheel_rate"):
         if name in craft.wheel_names and now.wheel(name) is None:
             doubts.append(f"wheel {name} was not in service then ({_when(telemetry)}): its rate is not used")
-    name = None if given else (_moved(telemetry, craft) if moving == "auto" else moving)
+    part = None if given else (_moved(telemetry, craft) if moving == "auto" else moving)
     I_B = now.inertia_kgm2
-    if name is not None and I_B is not None:
-        I_B = now.effective_inertia(name)
-    return Subject(telemetry, now, I_B, name, tuple(dict.fromkeys(doubts)))
+    if part is not None and I_B is not None:
+        I_B = now.effective_inertia(part)
+    return Subject(telemetry, now, I_B, part, tuple(dict.fromkeys(doubts)))
 
 
 def _when(telemetry: Telemetry) -> str:

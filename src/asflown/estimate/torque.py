@@ -129,7 +129,8 @@ def _smoothing_doubts(result: TorqueResult, half_width_s: float) -> list[str]:
         for p in find_peaks(result, j):
             k = int(np.argmin(np.abs(result.time_s - p.time_s)))
             worst = max(worst, _FIRST_PASS * float(loss[k] / p.torque_Nm))
-            noise = max(noise, 2 * float(result.sigma_Nm[k, j] / abs(p.torque_Nm)))
+            if result.sigma_Nm is not None:
+                noise = max(noise, 2 * float(result.sigma_Nm[k, j] / abs(p.torque_Nm)))
     if worst < 0.02:
         return []
     if worst > 0.5:

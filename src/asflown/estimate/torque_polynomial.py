@@ -74,8 +74,9 @@ def _momentum_samples(subject: Subject):
     if not stored:
         raise BadInput("the polynomial method needs wheel rates or wheel momentum", remedy="Use --method momentum.")
     rates = [tlm.channel(f"body_rate_{a}") for a in AXES] if tlm.has_axes("body_rate") and I_B is not None else []
+    columns = [] if I_B is None else list(I_B.T)
     terms = [(c, d, WHEEL_HALF_WIDTH_S) for c, d in stored] + [
-        (c, I_B[:, j], BODY_HALF_WIDTH_S) for j, c in enumerate(rates)
+        (c, d, BODY_HALF_WIDTH_S) for c, d in zip(rates, columns, strict=False)
     ]
     grid = grid_for([c for c, _, _ in terms])
     lead = stored[0][0].usable

@@ -10,6 +10,7 @@ import re
 import warnings
 from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -55,7 +56,7 @@ def _from_ns(tai_ns):
 _YDAY = re.compile(r"^(\d{4})-?(\d{3})(?:[T:]|//)")
 
 
-def utc_to_tai_ns(stamps) -> np.ndarray:
+def utc_to_tai_ns(stamps) -> Any:
     """UTC labels, ISO 8601 or day-of-year (2015-272T00:00:00), to int64 ns TAI.
 
     Accepts a trailing Z or ' UTC'.  Raises BadInput, naming the first stamp it cannot read.

@@ -87,7 +87,7 @@ def torque_figure(results: list[TorqueResult], axis: str, title: str, *, truth=N
     figure, (ax,) = new_figure(height=4.0)
     j = AXES.index(axis)
     if truth is not None:
-        draw_truth(*truth, ax)
+        draw_truth(truth[0], truth[1], ax)
     for result, color in zip(results, (BLUE, RED, GREEN, ORANGE), strict=False):
         draw_torque(result, ax, j, color=color)
     if stall_s is not None:

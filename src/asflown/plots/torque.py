@@ -43,7 +43,7 @@ def draw_torque(result: TorqueResult, ax, axis: int, *, color=BLUE, label=None, 
     return ax
 
 
-def draw_truth(time_s, torque_Nm, ax, label="true torque"):
+def draw_truth(time_s, torque_Nm, ax, *, label="true torque"):
     """The torque that was really there, in a simulation, in mN m over minutes. Returns ax."""
     ax.plot(
         np.asarray(time_s) / 60, 1e3 * np.asarray(torque_Nm), color=GREY, linewidth=1.2, linestyle="--", label=label

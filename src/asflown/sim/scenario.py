@@ -6,16 +6,15 @@ Times count from the epoch, at which recording starts.  docs/simulator.md lists 
 from __future__ import annotations
 
 import re
-import tomllib
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, model_validator
 
-from ..craft.load import in_words
 from ..craft.model import Direction, InertiaElements, Kilogram, Metre, NewtonMetre, Radian, RadianPerSecond, Second, _in
+from ..kit.config import read_bytes, toml_table, validated
 from ..kit.errors import BadInput, some_of
 from ..kit.quantities import numbers, quantity
 from ..kit.timeline import utc_to_tai_ns
@@ -279,14 +278,8 @@ def _merged(old: dict, new: dict) -> dict:
 
 
 def _checked(written: dict, where: str, folder: Path) -> Scenario:
-    try:
-        scenario = Scenario.model_validate(written)
-    except BadInput as why:
-        raise BadInput(why.what, file=where, remedy=why.remedy) from why
-    except ValidationError as why:
-        raise BadInput(
-            in_words(why), file=where, remedy="See docs/simulator.md for the keys; every value carries its unit."
-        ) from None
+    remedy = "See docs/simulator.md for the keys; every value carries its unit."
+    scenario = validated(Scenario, written, where, remedy)
     scenario._written, scenario._folder = written, folder
     return scenario
 
@@ -306,13 +299,8 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     Raises BadInput for an unknown name, an unreadable file, an unknown key or a wrong unit."""
     text, path = str(name_or_path), Path(name_or_path)
     if path.suffix == ".toml" or "/" in text:
-        if not path.is_file():
-            raise BadInput(
-                "there is no such scenario file",
-                file=path,
-                remedy=f"Give a TOML file, or a shipped scenario: {some_of(shipped_scenarios())}.",
-            )
-        source, folder, name = path.read_bytes(), path.parent, path.name
+        remedy = f"Give a TOML file, or a shipped scenario: {some_of(shipped_scenarios())}."
+        source, folder, name = read_bytes(path, "scenario file", remedy), path.parent, path.name
     else:
         if text not in shipped_scenarios():
             raise BadInput(
@@ -320,10 +308,7 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
                 remedy=f"Shipped: {some_of(shipped_scenarios())}. For your own, give the path of a TOML file.",
             )
         source, folder, name = (_shipped() / f"{text}.toml").read_bytes(), Path(), text
-    try:
-        written = tomllib.loads(source.decode("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as why:
-        raise BadInput(f"not a TOML file ({why})", file=name, remedy="Check the syntax near that place.") from why
+    written = toml_table(source, name)
     return _checked({"name": path.stem} | written, name, folder)
 
 

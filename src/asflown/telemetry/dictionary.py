@@ -21,13 +21,12 @@ the orbit normal, x along the velocity), whose turning with the orbit is then re
 
 from __future__ import annotations
 
-import tomllib
-from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
+from ..kit.config import read_bytes, toml_table, validated
 from ..kit.errors import BadInput, some_of
 from ..kit.quantities import quantity
 from ..kit.rotations import lvlh_to_inertial, quaternion, rotation
@@ -105,30 +104,14 @@ class ChannelDictionary(_Part):
 
 def load_dictionary(path) -> ChannelDictionary:
     """Read and check a dictionary.  Raises BadInput for a missing file, an unknown key, name or unit."""
-    path = Path(path)
+    source = read_bytes(path, "channel dictionary", "Give a TOML file; examples/ holds some.")
+    remedy = "docs/telemetry.md lists the keys of a channel dictionary."
+    entry = validated(ChannelDictionary, toml_table(source, path), path, remedy)
     try:
-        if not path.is_file():
-            raise BadInput("there is no such channel dictionary", remedy="Give a TOML file; examples/ holds some.")
-        try:
-            entry = ChannelDictionary.model_validate(tomllib.loads(path.read_text("utf-8")))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as why:
-            raise BadInput(f"not a TOML file ({why})", remedy="Check the syntax near that place.") from None
-        except ValidationError as why:
-            raise BadInput(in_words(why), remedy="docs/telemetry.md lists the keys of a channel dictionary.") from None
         _check(entry)
     except BadInput as why:
-        if why.file is not None:
-            raise
         raise BadInput(why.what, remedy=why.remedy, file=path, channel=why.channel) from None
     return entry
-
-
-def in_words(why: ValidationError) -> str:
-    said = []
-    for e in why.errors()[:5]:
-        where = ".".join(str(p) for p in e["loc"])
-        said.append(f"{where}: {'unknown key' if e['type'] == 'extra_forbidden' else e['msg']}")
-    return "; ".join(said) + (f"; and {len(why.errors()) - 5} more" if len(why.errors()) > 5 else "")
 
 
 def _check(entry: ChannelDictionary) -> None:

@@ -119,10 +119,8 @@ class Telemetry:
         """Seconds from the epoch."""
         return seconds_since(tai_ns, self.epoch_ns)
 
-    def moment(self, text: str | float | None) -> int | None:
+    def moment(self, text: str | float) -> int:
         """'120' (seconds from the epoch) or a UTC stamp -> ns TAI."""
-        if text is None:
-            return None
         try:
             return self.epoch_ns + round(float(text) * NS)
         except ValueError:

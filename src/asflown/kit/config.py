@@ -1,0 +1,50 @@
+"""TOML into validated data, with complaints a person can act on."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from .errors import BadInput
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def toml_table(source: bytes, file: object) -> dict:
+    """The content of a TOML file.  Raises BadInput, naming the place, where it is not one."""
+    try:
+        return tomllib.loads(source.decode("utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as why:
+        raise BadInput(f"not a TOML file ({why})", file=file, remedy="Check the syntax near that place.") from None
+
+
+def read_bytes(path: str | Path, what: str, remedy: str) -> bytes:
+    """A file's bytes.  Raises BadInput where there is none."""
+    try:
+        return Path(path).read_bytes()
+    except OSError as why:
+        raise BadInput(f"there is no such {what} ({why.strerror})", file=path, remedy=remedy) from None
+
+
+def validated(model: type[Model], table: dict, file: object, remedy: str) -> Model:
+    """``table`` as a ``model``.  Raises BadInput for unknown keys, wrong units and impossible values."""
+    try:
+        return model.model_validate(table)
+    except BadInput as why:
+        raise BadInput(why.what, file=file, channel=why.channel, remedy=why.remedy) from None
+    except ValidationError as why:
+        raise BadInput(_in_words(why), file=file, remedy=remedy) from None
+
+
+def _in_words(why: ValidationError) -> str:
+    said = []
+    for e in why.errors()[:5]:
+        where = ".".join(str(p) for p in e["loc"])
+        unknown = e["type"] == "extra_forbidden"
+        kind = "unknown key" if unknown else e["msg"].removeprefix("Value error, ").split("\n")[0]
+        said.append(f"{where}: {kind}" if where else kind)
+    more = len(why.errors()) - 5
+    return "; ".join(said) + (f"; and {more} more" if more > 0 else "")
