@@ -25,6 +25,13 @@ def test_law_loess_equals_the_reference_on_an_even_record(samples, span):
     assert np.abs(loess(y, span) - reference(x, y, span)).max() < 1e-12
 
 
+def test_law_loess_equals_the_reference_with_samples_missing():
+    rng = np.random.default_rng(5)
+    x = np.delete(np.arange(1500.0), rng.choice(np.arange(1, 1499), 60, replace=False))
+    y = np.sin(x / 20) + 0.1 * rng.normal(size=len(x))
+    assert np.abs(local_polynomial(x, y, x, degree=2, neighbors=39).value - reference(x, y, 39)).max() < 1e-12
+
+
 def test_law_loess_equals_the_reference_on_an_uneven_record():
     rng = np.random.default_rng(3)
     x = np.sort(rng.uniform(0, 100, 300))

@@ -163,10 +163,12 @@ def _complete_windows(t, y, at, step, reach, degree, order, fit) -> np.ndarray:
         k = k[np.abs(k - f) * step < reach * (1 - 1e-12)]
         offset = (k - f) * step
         here = np.flatnonzero(inside & (phase == f))
-        low, high = base[here] + k[0], base[here] + k[-1] + 1
+        # a sample at the very edge weighs nothing, but would be counted as a neighbour: it must be there too
+        before, after = int(np.ceil(f - reach / step - 1e-9)), int(np.floor(f + reach / step + 1e-9))
+        low, high = base[here] + before, base[here] + after + 1
         good = (low >= 0) & (high <= len(lattice))
         good[good] = missing[high[good]] == missing[low[good]]
-        here, low = here[good], low[good]
+        here, low = here[good], (base[here] + k[0])[good]
         if len(k) < degree + 1 or not len(here):
             continue
         rows = _rows(offset[None], reach, degree, order)[0]
