@@ -12,7 +12,7 @@ $(V)/.ok: requirements.lock pyproject.toml
 	$(PYTHON) -m venv $(V)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --only-binary :all: -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
-	$(BIN)/python -m asflown.sim.prewarm
+	$(BIN)/python -m asflown.cli.prewarm
 	@touch $@
 
 setup: $(V)/.ok            ## environment in .venv, from the hashed lock

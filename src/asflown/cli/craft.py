@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import typer
 
-from .output import plain, print_doubts, print_json, provenance
+from .output import plain, print_doubts, print_json, provenance, wrapped
 
-app = typer.Typer(help=__doc__, no_args_is_help=True, rich_markup_mode=None)
+app = typer.Typer(help=__doc__, rich_markup_mode=None)
 JSON = typer.Option(False, "--json", help="One JSON object on standard output.")
 
 
@@ -40,7 +40,7 @@ def show(
     from asflown.kit.timeline import utc_to_tai_ns
 
     c = load_craft(name)
-    now = c.at(utc_to_tai_ns(at) if at else None)
+    now = c.at(utc_to_tai_ns(at) if at is not None else None)
     if json:
         print_json(
             _record(c, now, at) | {"command": "craft show", "provenance": provenance({}, {"craft": name, "at": at})}
@@ -53,21 +53,34 @@ def show(
             print("    " + " ".join(f"{v:12.6g}" for v in row))
     for w in now.wheels:
         spin = "unknown" if w.spin_inertia is None else f"{w.spin_inertia:.5f} kg m2"
-        print(f"  wheel {w.name:6s} axis ({w.axis[0]:+.4f} {w.axis[1]:+.4f} {w.axis[2]:+.4f})  spin inertia {spin}"
-              + (f"  ({w.note})" if w.note else ""))  # fmt: skip
+        print(f"  wheel {w.name:6s} axis ({w.axis[0]:+.4f} {w.axis[1]:+.4f} {w.axis[2]:+.4f})  spin inertia {spin}")
+        if w.note:
+            print(wrapped(" " * 15, w.note))
     for t in c.thrusters:
         p, d = t.position, t.direction
-        print(f"  thruster {t.name:3s} at ({p[0]:+.3f} {p[1]:+.3f} {p[2]:+.3f}) m  force along ({d[0]:+g} {d[1]:+g} {d[2]:+g})"
-              f"  {t.nominal_thrust:g} N  delay {1e3 * t.delay:g} rise {1e3 * t.rise:g} fall {1e3 * t.fall:g} ms")  # fmt: skip
+        print(f"  thruster {t.name:3s} at ({p[0]:+.3f} {p[1]:+.3f} {p[2]:+.3f}) m  force along ({d[0]:g} {d[1]:g} {d[2]:g})"
+              f"  {t.nominal_thrust:g} N")  # fmt: skip
+    for timing, names in _by_timing(c.thrusters).items():
+        print(wrapped("                ", f"delay, rise, fall {timing} ms: {', '.join(names)}"))
     if k := c.wheel_controller:
-        print(f"  wheel controller: {k.bandwidth:g} Hz, damping {k.damping:g}, KP {k.kp_per_s:.6f} 1/s, KD {k.kd_per_s:.6f} 1/s, "
-              f"rate filter {k.rate_filter.natural_frequency:g} rad/s, damping {k.rate_filter.damping:g}, every {k.period:g} s")  # fmt: skip
+        print(f"  wheel controller: {k.bandwidth:g} Hz, damping {k.damping:g}, KP {k.kp_per_s:.6f} 1/s, KD {k.kd_per_s:.6f} 1/s\n"
+              f"                    rate filter {k.rate_filter.natural_frequency:g} rad/s, damping {k.rate_filter.damping:g}, every {k.period:g} s")  # fmt: skip
     for m in c.mechanisms:
-        print(f"  mechanism {m.name}: {m.mass:g} kg, {m.from_cm} m from the centre of mass")
+        print(
+            f"  mechanism {m.name}: {m.mass:g} kg at ({m.from_cm[0]:+.3f} {m.from_cm[1]:+.3f} {m.from_cm[2]:+.3f}) m from the centre of mass"
+        )
     print_doubts(now.doubts)
 
 
-@app.command()
+def _by_timing(thrusters) -> dict[str, list[str]]:
+    """Thrusters that open and close alike, together."""
+    found: dict[str, list[str]] = {}
+    for t in thrusters:
+        found.setdefault(f"{1e3 * t.delay:g}, {1e3 * t.rise:g}, {1e3 * t.fall:g}", []).append(t.name)
+    return found
+
+
+@app.command(short_help="Say what is wrong with a craft file, or that nothing is.")
 def check(file: str = typer.Argument(help="A craft TOML file."), json: bool = JSON) -> None:
     """Read a craft file and say what is wrong with it, or that nothing is."""
     from asflown.craft.load import load_craft
@@ -77,8 +90,8 @@ def check(file: str = typer.Argument(help="A craft TOML file."), json: bool = JS
     if json:
         print_json(_record(c, now, None) | {"command": "craft check", "provenance": provenance({}, {"craft": file})})
         return
-    print(f"{file}: a valid craft ({c.name}; {len(c.wheel_names)} wheels, {len(c.thrusters)} thrusters, "
-          f"{len(c.mass_properties)} mass properties)")  # fmt: skip
+    print(f"{file}: a valid craft ({c.name}; wheels: {len(c.wheel_names)}, thrusters: {len(c.thrusters)}, "
+          f"mass properties: {len(c.mass_properties)})")  # fmt: skip
     print_doubts(now.doubts)
 
 

@@ -19,6 +19,9 @@ def demo(
     json: bool = JSON,
 ) -> None:
     """Fly the papers' test torques and a cover deployment, reconstruct them, and say how wrong each method is."""
+    from asflown.kit.files import check_folder
+
+    check_folder(out)
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 

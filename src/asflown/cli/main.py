@@ -12,21 +12,25 @@ import typer
 
 from . import craft, demo, simulate, telemetry, torque
 
-app = typer.Typer(help=__doc__, add_completion=False, no_args_is_help=True, rich_markup_mode=None)
-app.command("torque")(torque.torque)
-app.command("simulate")(simulate.simulate)
-app.command("demo")(demo.demo)
-app.add_typer(telemetry.app, name="telemetry")
-app.add_typer(craft.app, name="craft")
+app = typer.Typer(help=__doc__, add_completion=False, rich_markup_mode=None)
+app.command("torque", short_help="Reconstruct the disturbance torque.")(torque.torque)
+app.command("simulate", short_help="Fly a scenario in the closed loop.")(simulate.simulate)
+app.command("demo", short_help="Fly the papers' cases and reconstruct them.")(demo.demo)
+app.add_typer(telemetry.app, name="telemetry", short_help="Check a telemetry file; list channel names.")
+app.add_typer(craft.app, name="craft", short_help="List, show and check crafts.")
 
 
 @app.callback(invoke_without_command=True)
-def _program(version: bool = typer.Option(False, "--version", help="Print the version and stop.")) -> None:
+def _program(
+    context: typer.Context, version: bool = typer.Option(False, "--version", help="Print the version and stop.")
+) -> None:
     if version:
         from asflown import __version__
 
         print(f"asflown {__version__}")
         raise typer.Exit()
+    if context.invoked_subcommand is None:
+        print(context.get_help())
 
 
 def main() -> None:
@@ -35,7 +39,7 @@ def main() -> None:
 
     code: object
     try:
-        code = app(standalone_mode=False)
+        code = app(standalone_mode=False, prog_name="asflown")
     except BadInput as why:
         code = _complain(str(why))
     except typer.Abort:
@@ -43,9 +47,11 @@ def main() -> None:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 0
+    except MemoryError:
+        code = _complain("there is not enough memory for this\nTake a shorter window or a shorter flight.")
     except Exception as why:
         if hasattr(why, "format_message"):  # the parser's own complaint about usage
-            code = _complain(f"{why.format_message()}\nSee `asflown {' '.join(_verb())} --help`.")
+            code = _complain(f"{why.format_message()}\nSee `{_verb(why)} --help`.")
         elif os.environ.get("ASFLOWN_DEBUG"):
             raise
         else:
@@ -54,13 +60,11 @@ def main() -> None:
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _verb() -> list[str]:
-    words = []
-    for word in sys.argv[1:3]:
-        if word.startswith("-") or "." in word or "/" in word:
-            break
-        words.append(word)
-    return words[:1] if words and words[0] not in ("telemetry", "craft") else words
+def _verb(usage) -> str:
+    """The command whose usage was wrong: 'asflown telemetry check'."""
+    context = getattr(usage, "ctx", None)
+    words = context.command_path.split()[1:] if context else [w for w in sys.argv[1:2] if w.isalpha()]
+    return " ".join(["asflown", *words])
 
 
 def _complain(text: str, code: int = 2) -> int:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import sys
+import textwrap
 from datetime import date
 from pathlib import Path
 
@@ -54,7 +56,20 @@ def say(text: str = "") -> None:
     print(text, file=sys.stderr, flush=True)
 
 
+def progress():
+    """``say`` for a person who waits; None where standard error is kept, so that an error stands there alone."""
+    return say if sys.stderr.isatty() else None
+
+
 def print_doubts(doubts) -> None:
     """Doubts in words, under every text result."""
     for d in doubts:
-        print(f"  DOUBT  {d}")
+        print(wrapped("  DOUBT  ", d))
+
+
+def wrapped(head: str, text: str) -> str:
+    """A sentence behind its head, folded to the terminal; one line where a program reads it."""
+    if not sys.stdout.isatty():
+        return head + text
+    width = max(40, shutil.get_terminal_size().columns)
+    return textwrap.fill(head + text, width, subsequent_indent=" " * len(head), break_long_words=False)

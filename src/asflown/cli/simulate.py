@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from .output import print_doubts, print_json, provenance, say
+from .output import print_doubts, print_json, progress, provenance
 
 
 def simulate(
@@ -21,17 +21,19 @@ def simulate(
 ) -> None:
     """Fly a scenario in the closed loop: telemetry as a spacecraft would send it, and the truth beside it."""
     from asflown.craft.load import load_craft
+    from asflown.kit.files import check_folder
     from asflown.kit.quantities import plain_numbers
     from asflown.sim.fly import fly, write_flight
     from asflown.sim.scenario import load_scenario
 
+    check_folder(out)
     plan = load_scenario(scenario)
     vehicle = load_craft(
         craft or plan.craft,
         inertia=plain_numbers(inertia, 6, "--inertia") if inertia is not None else None,
         cm=plain_numbers(cm, 3, "--cm") if cm is not None else None,
     )
-    flight = fly(plan, craft=vehicle, seed=seed, noise=noise, progress=say)
+    flight = fly(plan, craft=vehicle, seed=seed, noise=noise, progress=progress())
     files = write_flight(flight, out)
     options = {"craft": craft, "noise": noise, "inertia": inertia, "cm": cm}
     if json:

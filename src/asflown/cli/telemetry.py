@@ -6,11 +6,11 @@ import typer
 
 from .output import print_doubts, print_json, provenance
 
-app = typer.Typer(help=__doc__, no_args_is_help=True, rich_markup_mode=None)
+app = typer.Typer(help=__doc__, rich_markup_mode=None)
 JSON = typer.Option(False, "--json", help="One JSON object on standard output.")
 
 
-@app.command()
+@app.command(short_help="What a file holds, and what is wrong with it.")
 def check(
     file: str = typer.Argument(help="CSV (plain or gzip), Parquet, NetCDF or HDF5."),
     channels: str = typer.Option(None, "--channels", metavar="DICT", help="A channel dictionary (TOML)."),

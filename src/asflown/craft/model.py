@@ -8,6 +8,7 @@ products of inertia), about the centre of mass.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -54,7 +55,12 @@ else:  # how they are written
 
 
 def _spin_inertia(value):
-    return None if str(value).strip() == "unknown" else quantity(value, "kg m2")
+    if str(value).strip() == "unknown":
+        return None
+    inertia = quantity(value, "kg m2")
+    if inertia <= 0:
+        raise ValueError(f"{value!r} is not positive; the sense of rotation is that of the axis")
+    return inertia
 
 
 SpinInertia = Annotated[float | None, BeforeValidator(_spin_inertia)]
@@ -174,18 +180,18 @@ class ThrustHistory(_Data):
 class RateFilter(_Data):
     """Identical second-order low-pass sections in cascade."""
 
-    natural_frequency: RadianPerSecond
-    damping: float
+    natural_frequency: RadianPerSecond = Field(gt=0)
+    damping: float = Field(gt=0)
     sections: Literal[2] = 2
 
 
 class WheelController(_Data):
     """Proportional-derivative control on filtered rate (000 eqs 12, 13; see dynamics.loop)."""
 
-    bandwidth: Hertz
-    damping: float
+    bandwidth: Hertz = Field(gt=0)
+    damping: float = Field(gt=0)
     rate_filter: RateFilter
-    period: Second
+    period: Second = Field(gt=0)
 
     @property
     def natural_frequency_rad_s(self) -> float:
@@ -276,6 +282,12 @@ class Craft(_Data):
             names = [t.name for t in things]
             if len(set(names)) != len(names):
                 raise ValueError(f"a name is used twice: {some_of(names)}")
+        for name in self.wheel_names:
+            spans = sorted(_service(w) for w in self.wheels if w.name == name)
+            if any(a[1] > b[0] for a, b in pairwise(spans)):
+                raise ValueError(
+                    f"wheel {name!r} is described twice for one date: part them by valid_from and valid_to"
+                )
         relative = {w.spin_inertia is None for w in self.wheels}
         if len(relative) > 1:
             raise ValueError("either every wheel's spin inertia is known or none is")
@@ -363,6 +375,13 @@ class Craft(_Data):
             if u1 > u0:
                 return (u - u0) / (u1 - u0), "propellant"
         return (moment - start) / (stop - start), "date"
+
+
+def _service(wheel: Wheel) -> tuple[float, float]:
+    return (
+        -np.inf if wheel.valid_from is None else wheel.valid_from,
+        np.inf if wheel.valid_to is None else wheel.valid_to,
+    )
 
 
 def _latest(wheels):

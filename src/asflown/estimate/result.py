@@ -42,6 +42,7 @@ class TorqueResult:
     relative: bool = False
     settings: dict = field(default_factory=dict)  # what the estimator chose: windows, model, inertia
     fits: tuple[dict, ...] = ()  # the polynomial method's orders and misfits
+    paths_Nm: np.ndarray | None = None  # (K, M, 3), torques drawn from the joint posterior
 
     @property
     def axes(self) -> tuple[int, ...]:
@@ -50,6 +51,37 @@ class TorqueResult:
     @property
     def peaks(self) -> list[Peak]:
         return [p for a in self.axes for p in find_peaks(self, a)]
+
+    def impulse(self, start_s: float, stop_s: float, axis: str) -> tuple[float, float | None]:
+        """Angular impulse about an axis between two instants (seconds from the epoch), and its sigma. [N m s]
+
+        The sigma comes from torques drawn from the joint posterior, so that errors which follow each
+        other in time are counted as such; None for a method without one."""
+        j = AXES.index(axis)
+        inside = (self.time_s >= start_s) & (self.time_s <= stop_s)
+        t = np.concatenate([[start_s], self.time_s[inside], [stop_s]])
+
+        def area(torque):
+            return float(np.trapezoid(np.interp(t, self.time_s, torque), t))
+
+        if self.paths_Nm is None:
+            return area(self.torque_Nm[:, j]), None
+        drawn = [area(p[:, j]) for p in self.paths_Nm]
+        return area(self.torque_Nm[:, j]), float(np.std(drawn, ddof=1))
+
+    def peak_height(self, time_s: float, reach_s: float, axis: str) -> tuple[float, float | None]:
+        """Height of the excursion within ``reach_s`` of a time, and its sigma. [N m]
+
+        The mean over drawn torques of each one's own extremum: the extremum of a mean curve is lower,
+        since it is rounded by the doubt about where the corner is."""
+        j = AXES.index(axis)
+        near = np.abs(self.time_s - time_s) <= reach_s
+        mean = self.torque_Nm[near, j]
+        sign = np.sign(mean[np.argmax(np.abs(mean))])
+        if self.paths_Nm is None:
+            return float(sign * np.max(sign * mean)), None
+        heights = sign * np.max(sign * self.paths_Nm[:, near, j], axis=1)
+        return float(heights.mean()), float(heights.std(ddof=1))
 
     @property
     def unit(self) -> str:
@@ -121,20 +153,21 @@ class TorqueResult:
 
 
 def find_peaks(result: TorqueResult, axis: int) -> list[Peak]:
-    """Excursions that stand out: prominence above a quarter of the largest, and above 4 sigma."""
+    """Excursions that stand out: prominence above a quarter of the largest, height above 4 sigma at that instant."""
     torque = result.torque_Nm[:, axis]
     known = np.isfinite(torque)
     if known.sum() < 3 or not np.any(torque[known]):
         return []
-    threshold = 0.25 * np.nanmax(np.abs(torque))
-    if result.sigma_Nm is not None:
-        threshold = max(threshold, 4 * float(np.nanmedian(result.sigma_Nm[known, axis])))
+    sure = known if result.sigma_Nm is None else known & (np.abs(torque) > 4 * result.sigma_Nm[:, axis])
+    if not sure.any():
+        return []
+    threshold = 0.25 * np.max(np.abs(torque[sure]))
     filled = np.where(known, torque, 0.0)
     found: list[int] = []
     for sign in (1, -1):
         at, _ = signal.find_peaks(sign * filled, height=threshold, prominence=threshold)
         found += at.tolist()
-    return [Peak(float(result.time_s[k]), float(torque[k]), AXES[axis]) for k in sorted(found)]
+    return [Peak(float(result.time_s[k]), float(torque[k]), AXES[axis]) for k in sorted(found) if sure[k]]
 
 
 def save_csv(result: TorqueResult, path, provenance: dict) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -10,10 +11,17 @@ from ..craft.model import Craft, CraftAt, Wheel
 from ..kit.errors import BadInput, some_of
 from ..kit.regression import LocalFit, local_polynomial, noise_sigma
 from ..kit.timeline import NS, utc_label
+from ..telemetry.channels import AXES
 from ..telemetry.telemetry import Channel, Telemetry
 
 #: A mechanism counts as moving when its angle changes by more than this. [rad]
 _MOVED = 0.05
+
+#: A body rate that changes by more than this is that of a slew. [rad/s]
+_SWING_OF_A_SLEW = 2e-4
+
+#: Instants in one estimate: five weeks at 1 s, some gigabytes of memory.
+_MOST_INSTANTS = 3_000_000
 
 
 @dataclass(frozen=True)
@@ -34,7 +42,8 @@ class Subject:
         k = self.craft.craft.wheel_controller
         if k is None:
             raise BadInput(
-                f"{self.craft.craft.name} has no wheel controller, which this method needs",
+                "this craft has no wheel controller, which the method needs",
+                file=self.craft.craft.name,
                 remedy="Describe it under [wheel_controller] in the craft file, or use --method momentum.",
             )
         return k
@@ -95,6 +104,25 @@ def _moved(telemetry: Telemetry, craft: Craft) -> str | None:
     return None
 
 
+def slews(telemetry: Telemetry) -> bool:
+    """Whether the body's rate changes as it does in a slew, never in a hold."""
+    rates = [telemetry.channel(f"body_rate_{a}").usable.values for a in AXES if f"body_rate_{a}" in telemetry]
+    return any(len(r) and np.ptp(r) > _SWING_OF_A_SLEW for r in rates)
+
+
+def thrusters_firing(telemetry: Telemetry) -> list[str]:
+    """Thrusters whose cumulative on-time or pulse count rises in the record."""
+    channels = [c for c in telemetry.channels.values() if c.kind.stem in ("on_time", "pulse_count")]
+    return list(dict.fromkeys(c.member for c in channels if (np.diff(c.usable.values) > 0).any()))
+
+
+def gaps_on_grid(channel: Channel, grid: Grid) -> list[tuple[float, float]]:
+    """Gaps of a channel, from the grid's start. [s]"""
+    c = channel.usable
+    t = (c.tai_ns - np.int64(grid.start_ns)) / NS
+    return [(float(t[a.stop - 1]), float(t[b.start])) for a, b in pairwise(c.segments())]
+
+
 @dataclass(frozen=True)
 class Grid:
     """Evenly spaced instants (int64 ns TAI) at which an estimate is given."""
@@ -120,7 +148,7 @@ def grid_for(channels: list[Channel], step_s: float | None = None) -> Grid:
     for c in usable:
         if len(c.tai_ns) < 2:
             raise BadInput(
-                f"{len(c.tai_ns)} usable samples are too few",
+                f"too few usable samples ({len(c.tai_ns)})",
                 channel=c.name,
                 remedy="Take a longer window, or check what was excluded (asflown telemetry check).",
             )
@@ -133,7 +161,15 @@ def grid_for(channels: list[Channel], step_s: float | None = None) -> Grid:
             f"{some_of(c.name for c in channels)} have no time in common",
             remedy="These channels must overlap in time.",
         )
-    return Grid(start, step_s, int(np.floor((stop - start) / NS / step_s + 1e-9)) + 1)
+    count = int(np.floor((stop - start) / NS / step_s + 1e-9)) + 1
+    if count > _MOST_INSTANTS:
+        raise BadInput(
+            f"the record spans {(stop - start) / NS / 86_400:,.0f} days, {count:,} instants of {step_s:g} s: too many for one estimate",
+            channel=usable[0].name,
+            remedy="Give a window (--start, --stop). If the record is not that long, one time stamp is wrong "
+            "(asflown telemetry check shows the gap).",
+        )
+    return Grid(start, step_s, count)
 
 
 @dataclass(frozen=True)

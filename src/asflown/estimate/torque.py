@@ -9,12 +9,12 @@ import numpy as np
 from ..craft.model import Craft
 from ..kit.errors import BadInput, some_of
 from ..telemetry.telemetry import Telemetry
-from . import torque_momentum, torque_polynomial, torque_transfer
+from . import torque_fused, torque_momentum, torque_polynomial, torque_transfer
 from .compare import consistency_doubts
 from .result import AXES, TorqueResult, find_peaks
-from .subject import Subject, subject_of
+from .subject import Subject, slews, subject_of, thrusters_firing
 
-METHODS = ("momentum", "transfer", "polynomial")
+METHODS = ("momentum", "transfer", "polynomial", "fused")
 VARIANTS = ("corrected", "printed")
 
 
@@ -28,12 +28,14 @@ def disturbance_torque(
     model: str | None = None,
     order: int = 12,
     window_s: float | None = None,
+    prior: str = "edges",
     moving: str | None = "auto",
 ) -> TorqueResult:
     """The torque on the body that the actuators did not command, in body axes. [N m]
 
-    ``method``: 'momentum' (000 eqs 2-9), 'transfer' (000 eqs 10-20; ``model`` low, hankel or full) or
-    'polynomial' (004 eqs 7, 17, 18; ``order`` 6, 12, 15 or 18).  ``variant``: 'corrected', or
+    ``method``: 'momentum' (000 eqs 2-9), 'transfer' (000 eqs 10-20; ``model`` low, hankel or full),
+    'polynomial' (004 eqs 7, 17, 18; ``order`` 6, 12, 15 or 18) or 'fused' (all channels at once; ``prior``
+    edges or smooth).  ``variant``: 'corrected', or
     'printed', the paper's way with its faults.  ``window_s``: full width of the corrected methods'
     local fits, in place of the studied ones.  ``moving``: see ``subject_of``.
 
@@ -46,9 +48,19 @@ def disturbance_torque(
         _check(model, torque_transfer.MODELS, "model")
     if window_s is not None and not 0 < window_s < 1e9:
         raise BadInput(f"a window of {window_s} s is not possible", remedy="Give a positive number of seconds.")
+    _check(order, torque_polynomial.ORDERS, "order")
+    if model is not None and method in ("momentum", "fused"):
+        raise BadInput(
+            f"the {method} method has no loop model to choose", remedy="Leave --model out, or use --method transfer."
+        )
+    if window_s is not None and (variant == "printed" or method in ("polynomial", "fused")):
+        raise BadInput(f"the {method} method, {variant}, has no window to choose", remedy="Leave --window out.")
     subject = subject_of(telemetry, craft, moving)
-    answer = _run(subject, method, variant, model, order, window_s)
-    grid, torque, sigma, momentum, settings, doubts, fits = answer
+    try:
+        answer = _run(subject, method, variant, axis, model, order, window_s, prior)
+    except BadInput as why:
+        raise why.within(telemetry.source) from why.__cause__
+    grid, torque, sigma, momentum, settings, doubts, fits, *paths = answer
     time_s = grid.from_epoch(telemetry)
     columns = list(range(3)) if axis == "all" else [AXES.index(axis)]
     for j in columns:
@@ -67,18 +79,24 @@ def disturbance_torque(
         relative=subject.relative and method != "transfer",
         settings=settings | _inertia_used(subject),
         fits=tuple(fits),
+        paths_Nm=paths[0] if paths else None,
     )
-    doubts = [*subject.doubts, *doubts, *_relative_doubts(subject, result)]
+    doubts = [*subject.doubts, *doubts, *_thruster_doubts(subject), *_relative_doubts(subject, result)]
     if method == "momentum" and variant == "corrected":
-        doubts += _smoothing_doubts(result, settings["half_width_body_s"])
+        doubts += _smoothing_doubts(result, settings["half_width_s"])
     ready = {method: answer} if variant == "corrected" and sigma is not None else {}
     doubts += _consistency(subject, ready)
     return _with_doubts(result, doubts)
 
 
-def _run(subject: Subject, method, variant, model, order, window_s):
+def _run(subject: Subject, method, variant, axis, model, order, window_s, prior):
     if method == "polynomial":
         return torque_polynomial.polynomial(subject, order, model or "low")
+    if method == "fused":
+        if variant == "printed":
+            raise BadInput("the fused method is in no paper", remedy="Leave --variant out.")
+        *answer, paths = torque_fused.fused(subject, prior, (0, 1, 2) if axis == "all" else (AXES.index(axis),))
+        return (*answer, (), paths)
     module = {"momentum": torque_momentum, "transfer": torque_transfer}[method]
     options: dict = {}
     if method == "transfer":
@@ -115,6 +133,16 @@ def _relative_doubts(subject: Subject, result: TorqueResult) -> list[str]:
     ]
 
 
+def _thruster_doubts(subject: Subject) -> list[str]:
+    firing = thrusters_firing(subject.telemetry)
+    if not firing:
+        return []
+    return [
+        f"thrusters fire in this record ({some_of(firing)}): their torque is part of the result, and where they rather than the "
+        "wheels hold the attitude the transfer method does not apply"
+    ]
+
+
 #: A corner rounded twice is rounded over sqrt(2) times the width: the first pass took this many times
 #: what the second takes.
 _FIRST_PASS = 1 / (np.sqrt(2) - 1)
@@ -148,6 +176,8 @@ def _smoothing_doubts(result: TorqueResult, half_width_s: float) -> list[str]:
 def _consistency(subject: Subject, ready: dict) -> list[str]:
     """Set wheels against attitude error where both are there: signs and units betray themselves."""
     tlm = subject.telemetry
+    if slews(tlm) or thrusters_firing(tlm):
+        return []  # the attitude error then answers to more than the disturbance
     wheels = bool(tlm.members("wheel_rate")) and not subject.relative
     errors = any(f"attitude_error_{a}" in tlm for a in AXES)
     if not (wheels and errors) or subject.inertia_kgm2 is None or subject.craft.craft.wheel_controller is None:

@@ -20,10 +20,11 @@ from ..kit.regression import local_polynomial, loess
 from ..kit.timeline import NS
 from ..telemetry.channels import AXES
 from ..telemetry.telemetry import Channel, Telemetry
-from .subject import Grid, Subject, fit_on_grid, grid_for
+from .subject import Grid, Subject, fit_on_grid, gaps_on_grid, grid_for
 
-#: Half-widths of the local cubics, chosen by studies/momentum_window.py. [s]
-WHEEL_HALF_WIDTH_S, BODY_HALF_WIDTH_S = 12.0, 20.0
+#: Half-width of the local cubics, chosen by studies/momentum_window.py; one for all channels, so that what
+#: wheels and body pass between them cancels. [s]
+HALF_WIDTH_S = 18.0
 
 #: The paper's smoothing span, as a fraction of the 1-s samples (000 section III-A).
 PRINTED_SPAN = 0.08
@@ -44,6 +45,9 @@ def printed(subject: Subject):
         f"printed method: I w is left out and the window is 8 % of the record ({span} s here): pulses of 15-30 s come out "
         "2-10 % high and 2 s late, narrower ones wrong by tens of percent"
     ]
+    doubts += gap_doubts(
+        subject.telemetry, grid, {g: c.name for c, _ in subject.wheels() for g in gaps_on_grid(c, grid)}
+    )
     coarsest = max(c.cadence_ns for c, _ in subject.wheels()) / NS
     if span < 5 * coarsest:
         doubts.append(
@@ -98,7 +102,7 @@ def corrected(subject: Subject, window_s: float | None = None):
     The actuators' momentum comes from wheel rates, from wheel_momentum, or, where only their torque
     is telemetered, from control_torque.  Returns as ``printed``, with sigma (M, 3)."""
     tlm, I_B = subject.telemetry, subject.inertia_kgm2
-    wheel_width, body_width = (WHEEL_HALF_WIDTH_S, BODY_HALF_WIDTH_S) if window_s is None else (window_s / 2,) * 2
+    width = HALF_WIDTH_S if window_s is None else window_s / 2
     doubts: list[str] = []
     has_rates = tlm.has_axes("body_rate")
     stored, pushed, spin_doubt = actuators(subject)
@@ -111,8 +115,8 @@ def corrected(subject: Subject, window_s: float | None = None):
     elif I_B is None:
         doubts.append("the craft's inertia is not known: the body's own momentum is left out, only w x h is kept")
     grid = grid_for([c for c, _ in stored] + rates + pushed)
-    wheels = [(fit_on_grid(c, grid, degree=3, half_width_s=wheel_width), c, direction) for c, direction in stored]
-    body = [(fit_on_grid(c, grid, degree=3, half_width_s=body_width), c, None if I_B is None else I_B[:, j])
+    wheels = [(fit_on_grid(c, grid, degree=3, half_width_s=width), c, direction) for c, direction in stored]
+    body = [(fit_on_grid(c, grid, degree=3, half_width_s=width), c, None if I_B is None else I_B[:, j])
             for j, c in enumerate(rates)]  # fmt: skip
     momentum, torque, variance = np.zeros((3, grid.count, 3))
     silent: dict[tuple[float, float], str] = {}
@@ -125,12 +129,12 @@ def corrected(subject: Subject, window_s: float | None = None):
     if body:
         torque += np.cross(np.stack([f.fit.value for f, _, _ in body], axis=1), momentum)
     for j, channel in enumerate(pushed):
-        f = fit_on_grid(channel, grid, degree=3, half_width_s=wheel_width)
+        f = fit_on_grid(channel, grid, degree=3, half_width_s=width)
         torque[:, j] -= f.fit.value
         variance[:, j] += f.variance([1, 0, 0])
         silent |= {g: channel.name for g in f.gaps}
     doubts += gap_doubts(tlm, grid, silent)
-    settings = {"half_width_wheels_s": wheel_width, "half_width_body_s": body_width, "degree": 3}
+    settings = {"half_width_s": width, "degree": 3}
     return grid, torque, np.sqrt(variance), momentum, settings, doubts
 
 

@@ -15,8 +15,8 @@ from ..dynamics.loop import hankel_order_two, low_order
 from ..kit.errors import BadInput
 from ..kit.timeline import NS
 from ..telemetry.channels import AXES
-from .subject import Grid, Subject, fit_on_grid, grid_for
-from .torque_momentum import BODY_HALF_WIDTH_S, WHEEL_HALF_WIDTH_S, actuators
+from .subject import Grid, Subject, fit_on_grid, gaps_on_grid, grid_for
+from .torque_momentum import HALF_WIDTH_S, actuators, gap_doubts
 
 ORDERS = (6, 12, 15, 18)
 
@@ -48,9 +48,14 @@ def polynomial(subject: Subject, order: int = 12, model: str = "low"):
     grid, t, H = samples
     torque = np.full((grid.count, 3), np.nan)
     smooth = np.full((grid.count, 3), np.nan)
+    silent = {g: c.name for c, _ in actuators(subject)[0] for g in gaps_on_grid(c, grid)}
+    doubts += gap_doubts(tlm, grid, silent)
     for j in range(3):
         p, _, _ = _fit(t, H[:, j], order)
         smooth[:, j], torque[:, j] = p(grid.seconds), p.deriv()(grid.seconds)
+    for a, b in silent:
+        inside = (grid.seconds > a + 1e-9) & (grid.seconds < b - 1e-9)
+        smooth[inside], torque[inside] = np.nan, np.nan
     return grid, torque, None, smooth, {"order": order}, doubts, fits
 
 
@@ -75,8 +80,8 @@ def _momentum_samples(subject: Subject):
         raise BadInput("the polynomial method needs wheel rates or wheel momentum", remedy="Use --method momentum.")
     rates = [tlm.channel(f"body_rate_{a}") for a in AXES] if tlm.has_axes("body_rate") and I_B is not None else []
     columns = [] if I_B is None else list(I_B.T)
-    terms = [(c, d, WHEEL_HALF_WIDTH_S) for c, d in stored] + [
-        (c, d, BODY_HALF_WIDTH_S) for c, d in zip(rates, columns, strict=False)
+    terms = [(c, d, HALF_WIDTH_S) for c, d in stored] + [
+        (c, d, HALF_WIDTH_S) for c, d in zip(rates, columns, strict=False)
     ]
     grid = grid_for([c for c, _, _ in terms])
     lead = stored[0][0].usable

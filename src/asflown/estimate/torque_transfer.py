@@ -23,8 +23,8 @@ from ..kit.errors import BadInput, some_of
 from ..kit.regression import LocalFit, local_polynomial
 from ..kit.timeline import NS
 from ..telemetry.channels import AXES
-from .subject import Grid, Subject, fit_on_grid, grid_for
-from .torque_momentum import WHEEL_HALF_WIDTH_S, gap_doubts, smoothed_as_printed, splined
+from .subject import Grid, Subject, fit_on_grid, gaps_on_grid, grid_for
+from .torque_momentum import HALF_WIDTH_S, gap_doubts, smoothed_as_printed, splined
 
 MODELS = ("low", "hankel", "full")
 
@@ -55,6 +55,7 @@ def printed(subject: Subject, model: str = "low"):
         f"printed method: smoothing over 8 % of the record ({span} s here) takes 10-15 % off pulses of 30 s, 20-27 % off "
         "pulses of 15 s, and half of those of 7-10 s"
     ]
+    doubts += gap_doubts(subject.telemetry, grid, {g: c.name for c in channels.values() for g in gaps_on_grid(c, grid)})
     return Grid(grid.start_ns, 1.0, grid.count - 2), torque, None, None, {"span_samples": span, "model": model}, doubts
 
 
@@ -202,8 +203,10 @@ def _rate_channel(tlm, axis: str):
 def _wheel_momentum(subject: Subject, grid: Grid) -> np.ndarray:
     h = np.zeros((grid.count, 3))
     for channel, wheel in subject.wheels():
-        f: LocalFit = fit_on_grid(channel, grid, degree=3, half_width_s=WHEEL_HALF_WIDTH_S).fit
-        h += np.outer(f.value, wheel.spin_inertia * np.asarray(wheel.axis))
+        f: LocalFit = fit_on_grid(channel, grid, degree=3, half_width_s=HALF_WIDTH_S).fit
+        known = np.isfinite(f.value)  # beyond its ends and in its gaps: it changes slowly, and w is small
+        value = np.interp(grid.seconds, grid.seconds[known], f.value[known])
+        h += np.outer(value, wheel.spin_inertia * np.asarray(wheel.axis))
     return h
 
 

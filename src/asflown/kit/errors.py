@@ -29,7 +29,8 @@ class BadInput(ValueError):
         if line is not None:
             place += f", line {line}" if place else f"line {line}"
         if channel is not None:
-            place += f", channel {channel}" if place else f"channel {channel}"
+            short = channel if len(channel) <= 80 else channel[:79] + "…"
+            place += f", channel {short}" if place else f"channel {short}"
         if time is not None:
             place += f", at {time}" if place else f"at {time}"
         head = f"{place}: {what}" if place else what
@@ -37,6 +38,12 @@ class BadInput(ValueError):
         if len(head) > room:
             head = head[: room - 1] + "…"
         super().__init__(f"{head}\n{remedy}")
+
+    def within(self, file: object) -> BadInput:
+        """The same complaint, with the file it is about where none is named yet."""
+        if self.file is not None or not file:
+            return self
+        return BadInput(self.what, remedy=self.remedy, file=file, channel=self.channel, time=self.time, line=self.line)
 
 
 def some_of(names, most: int = 12) -> str:

@@ -15,12 +15,36 @@ def sha256_of(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
+def check_place(path: str | Path) -> None:
+    """Raise BadInput where no file can be written: before the work whose result it is to hold.
+
+    What is there must be a plain file (a rename would replace a device or a pipe by one)."""
+    path = Path(path)
+    if os.path.exists(path) and not os.path.isfile(path):
+        what = "a directory" if os.path.isdir(path) else "not a plain file"
+        raise BadInput(f"cannot be written (this is {what})", file=path, remedy="Name a file.")
+    check_folder(path.parent)
+
+
+def check_folder(folder: str | Path) -> None:
+    """Raise BadInput where no file can be put into ``folder``, nor it be made."""
+    folder = Path(folder)
+    there = next(p for p in (folder.absolute(), *folder.absolute().parents) if os.path.exists(p))
+    try:
+        tempfile.TemporaryFile(dir=there).close()
+    except OSError as why:
+        raise BadInput(
+            f"cannot be written ({there}: {why.strerror})", file=folder, remedy="Name a folder you may write to."
+        ) from None
+
+
 def write_whole(path: str | Path, write: Callable[[Path], object]) -> None:
     """Let ``write`` fill a temporary neighbour of ``path``, then put it in place.
 
     A crash or a full disk leaves the old file, never half a new one.  Raises BadInput where the
     place cannot be written."""
     path = Path(path)
+    check_place(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent)

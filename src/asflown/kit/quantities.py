@@ -11,6 +11,9 @@ from functools import cache
 
 from .errors import BadInput
 
+#: No measured size is beyond it, and squares and products of such numbers do not overflow.
+_LARGEST = 1e60
+
 _NUMBER = re.compile(r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*$")
 
 
@@ -73,7 +76,7 @@ def quantity(text: object, expected: str) -> float:
     number, unit = match.groups()
     if unit == "" and expected != "":
         raise BadInput(f"{text!r} has no unit", remedy=f'Write the unit in the value, as in "{number} {expected}".')
-    return float(number) * si_factor(unit, expected)
+    return _sensible(float(number) * si_factor(unit, expected), text)
 
 
 def numbers(text: object, expected: str, count: int) -> tuple[float, ...]:
@@ -89,17 +92,21 @@ def numbers(text: object, expected: str, count: int) -> tuple[float, ...]:
     if unit == "" and expected != "":
         raise BadInput(f"{text!r} has no unit", remedy=f'End it with the unit, as in "{text} {expected}".')
     factor = si_factor(unit, expected)
-    return tuple(factor * float(p) for p in parts)
+    return tuple(_sensible(factor * float(p), text) for p in parts)
+
+
+def _sensible(value: float, text: object) -> float:
+    if not abs(value) < _LARGEST:
+        raise BadInput(f"{text!r} is too large for a measurement", remedy="Check its exponent.")
+    return value
 
 
 def plain_numbers(text: str, count: int, what: str) -> tuple[float, ...]:
-    """'1,2,3' from the command line, in SI, all finite."""
-    import math
-
+    """'1,2,3' from the command line, in SI."""
     try:
         values = tuple(float(p) for p in str(text).replace(" ", "").split(","))
     except ValueError:
         values = ()
-    if len(values) != count or not all(map(math.isfinite, values)):
+    if len(values) != count or not all(abs(v) < _LARGEST for v in values):  # also NaN
         raise BadInput(f"{what} {text!r} is not {count} numbers", remedy=f"Give {count} numbers divided by commas.")
     return values

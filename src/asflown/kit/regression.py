@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .compiled import jit
 from .errors import BadInput
 
 _MOST_PHASES = 64  # distinct offsets of the wanted instants within one sample step
@@ -84,7 +85,7 @@ def local_polynomial(
     if step and (half_width is not None or neighbors % 2) and len(t) > neighbors:
         rest &= ~_complete_windows(t, y, at, step, reach, degree, order, fit)
     todo = np.flatnonzero(rest)
-    for part in np.array_split(todo, max(1, len(todo) * (neighbors + 4) // 2_000_000 + 1)):
+    for part in np.array_split(todo, len(todo) * (neighbors + 4) // 5_000_000 + 1):
         if len(part):
             _direct(t, y, at, part, degree, order, neighbors, half_width, fit)
     return fit
@@ -193,17 +194,75 @@ def _direct(t, y, at, which, degree, order, neighbors, half_width, fit) -> None:
         low, high = np.searchsorted(t, a - bandwidth), np.searchsorted(t, a + bandwidth, side="right")
     else:
         low, high = best, best + neighbors
-    k = int((high - low).max())
-    index = low[:, None] + np.arange(k)
-    held = index < high[:, None]
-    index = np.minimum(index, len(t) - 1)
-    offset = np.where(held, t[index] - a[:, None], bandwidth[:, None])  # weight zero where not held
-    positive = (_tricube(offset / bandwidth[:, None]) > 0).sum(axis=1)
-    bandwidth = np.where(positive < degree + 1, bandwidth * 1.5, bandwidth)
-    if (positive < degree + 1).any():  # a window with too few samples that weigh: widen those
-        offset = np.where(held, offset, bandwidth[:, None])
-    rows = _rows(offset, bandwidth, degree, order)
-    fit.derivatives[:order, which] = np.einsum("mok,mk->om", rows, y[index])
-    fit.gain[np.ix_(which, range(order), range(order))] = np.einsum("mok,mpk->mop", rows, rows)
+    positive = (high - low) - (a - t[low] >= bandwidth) - (t[high - 1] - a >= bandwidth)
+    bandwidth = np.where(positive < degree + 1, bandwidth * 1.5, bandwidth)  # too few that weigh: widen those
+    parts = _evaluate(t, y, a, low, high, bandwidth, degree, order)
+    fit.derivatives[:, which], fit.gain[which], fit.own[which] = parts
     fit.half_width[which] = bandwidth
-    fit.own[which] = np.sum(rows[:, 0] * (held & (offset == 0)), axis=1)
+
+
+@jit
+def _evaluate(t, y, at, low, high, bandwidth, degree, order):
+    """Weighted polynomial fits, one an instant, by Gram-Schmidt done twice (good to rounding)."""
+    m, p = len(at), degree + 1
+    derivatives, gain, own = np.zeros((3, m)), np.zeros((m, 3, 3)), np.zeros(m)
+    longest = 0
+    for i in range(m):
+        longest = max(longest, high[i] - low[i])
+    Q, root, rows = np.empty((p, longest)), np.empty(longest), np.empty((order, longest))
+    for i in range(m):
+        k, h = high[i] - low[i], bandwidth[i]
+        for s in range(k):
+            u = (t[low[i] + s] - at[i]) / h
+            v = min(abs(u), 1.0)
+            root[s] = (1 - v * v * v) ** 1.5
+            power = root[s]
+            for c in range(p):
+                Q[c, s] = power
+                power *= u
+        R = np.zeros((p, p))
+        for c in range(p):
+            for _ in range(2):
+                for b in range(c):
+                    dot = 0.0
+                    for s in range(k):
+                        dot += Q[b, s] * Q[c, s]
+                    R[b, c] += dot
+                    for s in range(k):
+                        Q[c, s] -= dot * Q[b, s]
+            size = 0.0
+            for s in range(k):
+                size += Q[c, s] * Q[c, s]
+            R[c, c] = np.sqrt(size)
+            for s in range(k):
+                Q[c, s] /= R[c, c]
+        inverse = np.zeros((p, p))
+        for c in range(p):
+            inverse[c, c] = 1 / R[c, c]
+            for b in range(c - 1, -1, -1):
+                dot = 0.0
+                for x in range(b + 1, c + 1):
+                    dot += R[b, x] * inverse[x, c]
+                inverse[b, c] = -dot / R[b, b]
+        unit = 1.0
+        for o in range(order):
+            total = 0.0
+            for s in range(k):
+                weight = 0.0
+                for c in range(o, p):
+                    weight += inverse[o, c] * Q[c, s]
+                weight *= root[s] * unit
+                rows[o, s] = weight
+                total += weight * y[low[i] + s]
+                if o == 0 and t[low[i] + s] == at[i]:
+                    own[i] = weight
+            derivatives[o, i] = total
+            unit *= (o + 1) / h
+        for o in range(order):
+            for b in range(o + 1):
+                dot = 0.0
+                for s in range(k):
+                    dot += rows[o, s] * rows[b, s]
+                gain[i, o, b] = dot
+                gain[i, b, o] = dot
+    return derivatives, gain, own

@@ -19,6 +19,7 @@ from .errors import BadInput
 NS = 1_000_000_000
 _DAY_NS = 86_400 * NS
 _JD_ORIGIN = 2451544.5  # 2000-01-01 00:00 TAI
+_MOST_DAYS = 92_000  # either way: 1748 to 2251; int64 nanoseconds end in 2292
 
 
 @cache
@@ -44,6 +45,8 @@ def _to_ns(time) -> np.ndarray:
     """int64 ns since 2000-01-01 TAI.  jd1 holds whole or half days: exact to the nanosecond."""
     tai = time.tai
     day, rest = np.asarray(tai.jd1, float), np.asarray(tai.jd2, float)
+    if np.any(np.abs(day - _JD_ORIGIN) > _MOST_DAYS):
+        raise ValueError("int64 nanoseconds do not reach that far")
     return np.rint((day - _JD_ORIGIN) * _DAY_NS).astype(np.int64) + np.rint(rest * _DAY_NS).astype(np.int64)
 
 

@@ -30,20 +30,23 @@ def new_figure(rows: int = 1, columns: int = 1, *, width: float = 8.0, height: f
     return figure, axes
 
 
+def picture_kind(path: str | Path) -> str:
+    """'svg', 'png' or 'pdf'.  Raises BadInput for any other suffix."""
+    kind = Path(path).suffix.lower().removeprefix(".")
+    if kind not in ("svg", "png", "pdf"):
+        what = f"'.{kind}'" if kind else "a file without suffix"
+        raise BadInput(f"cannot draw into {what}", file=path, remedy="Name it .svg, .png or .pdf.")
+    return kind
+
+
 def save(figure, path: str | Path) -> None:
     """SVG, PNG or PDF by the suffix; text stays text in SVG, and equal input gives equal bytes."""
     import matplotlib
 
-    path = Path(path)
-    if path.suffix not in (".svg", ".png", ".pdf"):
-        raise BadInput(
-            f"cannot draw into {path.suffix or 'a file without suffix'!r}",
-            file=path,
-            remedy="Name it .svg, .png or .pdf.",
-        )
-    date_key = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": {}}[path.suffix]
+    kind = picture_kind(path)
+    date_key = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}[kind]
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "asflown", "font.family": "sans-serif"}):
-        write_whole(path, lambda p: figure.savefig(p, format=path.suffix[1:], dpi=150, metadata=date_key))
+        write_whole(path, lambda p: figure.savefig(p, format=kind, dpi=150, metadata=date_key))
 
 
 def breaks(time_s, values, longest_step_s: float):

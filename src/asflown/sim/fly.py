@@ -24,6 +24,7 @@ from .write import write_flight
 
 __all__ = ["Flight", "Truth", "fly", "write_flight"]
 
+MOST_CYCLES = 5_000_000  # a week at 8 Hz; some gigabytes of truth
 QUATERNION = ("w", "x", "y", "z")
 
 
@@ -87,6 +88,11 @@ def fly(scenario, *, craft=None, seed: int | None = None, noise: str | None = No
     loop = wheel_loop(scenario, now)
     part = moving_part(scenario.cover, now) if scenario.cover else None
     plant = _plant(scenario, now, part)
+    if (scenario.settle + scenario.duration) / loop.period > MOST_CYCLES:
+        raise BadInput(
+            f"{scenario.settle + scenario.duration:g} s are more than {MOST_CYCLES:,} control cycles of {loop.period:g} s",
+            remedy="Shorten duration and settle: everything true is kept for every cycle.",
+        )
     cycles = round(scenario.duration / loop.period) + 1
     before = int(np.ceil(scenario.settle / loop.period))
     times = loop.period * np.arange(-before, cycles)

@@ -20,18 +20,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..kit.compiled import jit
+
 #: Coulomb drag changes sign over this rate, for a step in it cannot be integrated. [rad/s]
 DRAG_REVERSAL_RATE = 0.02
 #: Stiction has fallen to 1/e of its excess over Coulomb drag at this rate (Stribeck). [rad/s]
 STRIBECK_RATE = 0.5
-
-
-def _jit(function):
-    try:
-        from numba import njit
-    except ImportError:
-        return function
-    return njit(cache=True)(function)
 
 
 class Plant(NamedTuple):
@@ -87,14 +81,14 @@ class Errors(NamedTuple):
     tachometer: np.ndarray  # (N, n)
 
 
-@_jit
+@jit
 def _cross(a, b, out):
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
-@_jit
+@jit
 def _solve3(m, b, out):
     """Symmetric 3 x 3 by cofactors."""
     c00 = m[1, 1] * m[2, 2] - m[1, 2] * m[1, 2]
@@ -109,7 +103,7 @@ def _solve3(m, b, out):
     out[2] = (c02 * b[0] + c12 * b[1] + c22 * b[2]) / det
 
 
-@_jit
+@jit
 def drag_torque(rate, viscous, coulomb, stiction):
     """Bearing drag opposing the rate: viscous, Coulomb, and stiction that fades (Stribeck). [N m]
 
@@ -118,7 +112,7 @@ def drag_torque(rate, viscous, coulomb, stiction):
     return viscous * rate + (coulomb + excess) * np.tanh(rate / DRAG_REVERSAL_RATE)
 
 
-@_jit
+@jit
 def external_torque(t, times, values, out):
     """Linear between the table's instants, held before and after. (3,) [N m]"""
     n = len(times)
@@ -136,7 +130,7 @@ def external_torque(t, times, values, out):
             out[i] = (1 - x) * values[j - 1, i] + x * values[j, i]
 
 
-@_jit
+@jit
 def moving_part_motion(t, times, quartic):
     """Angle, rate and acceleration of the moving part: quartics between breaks, at rest outside."""
     last = len(times) - 1
@@ -151,7 +145,7 @@ def moving_part_motion(t, times, quartic):
     return angle, ((4 * a * x + 3 * b) * x + 2 * c) * x + d, (12 * a * x + 6 * b) * x + 2 * c
 
 
-@_jit
+@jit
 def moving_part(t, plant):
     """Inertia (3, 3) of a part turning about a hinge, its slope in time, and h_rel (3,) with its slope.
 
@@ -180,7 +174,7 @@ def moving_part(t, plant):
     return inertia, slope * rate, g * rate, dg * rate**2 + g * acceleration
 
 
-@_jit
+@jit
 def moving_part_history(times, rates, plant):
     """At each instant: angle (N,), momentum of the moving part with the body's rate (N, 3), reaction torque (N, 3)."""
     angle, momentum, reaction = np.empty(len(times)), np.empty((len(times), 3)), np.empty((len(times), 3))
@@ -195,7 +189,7 @@ def moving_part_history(times, rates, plant):
     return angle, momentum, reaction
 
 
-@_jit
+@jit
 def _derivative(t, x, motor, plant, dx):
     """State: q (4), w (3), rho (n), eta (m), eta_dot (m), then the energy ledger of four: work by the
     external torque, work by the motors, loss in the bearings, loss in the modes. [J]"""
@@ -264,7 +258,7 @@ def _derivative(t, x, motor, plant, dx):
         dx[7 + n + m + k] -= d[0] * w_dot[0] + d[1] * w_dot[1] + d[2] * w_dot[2]
 
 
-@_jit
+@jit
 def advance(t, x, motor, plant, step, steps, work):
     """``steps`` Runge-Kutta steps of fourth order with the motor torques held; ``work`` is (5, len(x))."""
     k1, k2, k3, k4, y = work[0], work[1], work[2], work[3], work[4]
@@ -282,7 +276,7 @@ def advance(t, x, motor, plant, step, steps, work):
         x[:4] /= np.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2 + x[3] ** 2)
 
 
-@_jit
+@jit
 def _attitude_error(q, offset, q_c, out):
     """Commanded minus estimated, as a rotation vector; the estimate is q turned by the small ``offset``."""
     a, b, c, d = q[0], q[1], q[2], q[3]
@@ -300,7 +294,7 @@ def _attitude_error(q, offset, q_c, out):
         out *= angle / size if p0 >= 0 else -angle / size
 
 
-@_jit
+@jit
 def fly_cycles(plant, loop, errors, q_c, w_c, alpha_c, first_time, x, record):
     """Control cycles from ``first_time`` on, one row of ``record`` each, before its torque acts.
 

@@ -49,6 +49,11 @@ def telemetry_of(
         # integer nanoseconds of the cycle itself, so that a long flight keeps its instants exact
         tai_ns = epoch + np.rint(taken * (period_s * NS)).astype(np.int64)
         channels[name] = Channel(name, tai_ns, sampled, np.ones(len(taken), bool), kind_of(name).unit, count)
+    if not channels:
+        raise BadInput(
+            "this flight sends no telemetry at all",
+            remedy="Give a family under [telemetry] an interval, or a shorter one.",
+        )
     for gap in sampling.gaps:
         if gap.channel != "*" and not any(gap.channel in (n, kind_of(n).stem) for n in readings):
             raise BadInput(

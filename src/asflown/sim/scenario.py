@@ -158,7 +158,7 @@ class CoverMotion(_Part):
 class Controller(_Part):
     """How the flight software is run; its gains are the craft's."""
 
-    period: Second | None = None  # the craft's own unless given
+    period: Second | None = Field(default=None, gt=0)  # the craft's own unless given
     delay_cycles: int = Field(default=0, ge=0, le=8)
     filter: Literal["tustin", "zoh"] = "tustin"
     inertia: InertiaElements | None = None  # what the controller believes; the true one unless given
@@ -195,6 +195,9 @@ class Sampling(_Part):
 
     @model_validator(mode="after")
     def _known(self):
+        for stem, value in self:
+            if isinstance(value, float) and value < 0:
+                raise ValueError(f"{stem}: an interval is not negative; '0 s' leaves the channels out")
         for stem in self.quantum:
             self.count_size(stem)
         return self
@@ -245,7 +248,10 @@ class Scenario(_Part):
 
     @model_validator(mode="after")
     def _dated(self):
-        utc_to_tai_ns(self.epoch)
+        try:
+            utc_to_tai_ns(self.epoch)
+        except BadInput as why:
+            raise ValueError(f"epoch: {why.what}") from None
         return self
 
     @property

@@ -116,9 +116,9 @@ def to_si(name: str, unit: str) -> tuple[float, float]:
         return 1.0, 0.0
     if kind.unit == "K" and unit in ("deg_C", "degC", "°C", "C", "celsius"):
         return 1.0, 273.15
-    if unit != "":
-        parse_unit(unit)  # first: an unknown unit is a clearer complaint than a wrong one
     try:
+        if unit != "":
+            parse_unit(unit)  # first: an unknown unit is a clearer complaint than a wrong one
         return si_factor(unit, kind.unit), 0.0
     except BadInput as why:
         raise BadInput(why.what, channel=name, remedy=why.remedy) from why

@@ -69,19 +69,21 @@ def load_telemetry(path, *, channels=None, exclude=None, craft=None) -> Telemetr
         )
         telemetry = check_attitude(screen(telemetry, craft), read.readings)
     except BadInput as why:
-        if why.file is not None:
-            raise
-        raise BadInput(
-            why.what, remedy=why.remedy, file=path, channel=why.channel, time=why.time, line=why.line
-        ) from why.__cause__
-    return telemetry if exclude is None else telemetry.excluding(read_exclusions(exclude, telemetry))
+        raise why.within(path) from why.__cause__
+    if exclude is None:
+        return telemetry
+    spans = read_exclusions(exclude, telemetry)
+    try:
+        return telemetry.excluding(spans)
+    except BadInput as why:
+        raise why.within(exclude) from None
 
 
 def _bytes(path: Path) -> bytes:
-    if path.is_dir():
-        raise BadInput("this is a directory", remedy="Give one telemetry file.")
     try:
         data = path.read_bytes()
+    except IsADirectoryError:
+        raise BadInput("this is a directory", remedy="Give one file.") from None
     except FileNotFoundError:
         raise BadInput("there is no such file", remedy="Check the path.") from None
     except (OSError, ValueError) as why:
@@ -195,6 +197,8 @@ def _headed(table: Table) -> tuple[list[Use], list[int]]:
         if name.lower() in CLOCKS or (unit is not None and unit.lower() in _TIME_UNITS):
             clocks.append(j)
             continue
+        if not name:
+            raise BadInput(f"column {j + 1} has no heading", remedy="Name it 'name [unit]', or remove it.")
         if unit is None and not _is_state(name):
             raise BadInput(
                 f"the heading {heading[:60]!r} has no unit",
@@ -237,6 +241,11 @@ def assembled(parts: Sequence[tuple[Table, int, str, list[Use], list[int]]], epo
         if clocks and not labels:
             label_ns = tai_ns
             labels = {table.headings[j]: np.array([str(c) for c in table.columns[j]], dtype=str) for j in clocks}
+    if len(rows := np.concatenate(times)) > 1 and (rows == rows[0]).all():
+        raise BadInput(
+            f"time stands still: all {len(rows)} rows have the same time",
+            remedy="Check that the first column is the time, and that it was written with enough digits.",
+        )
     if not channels:
         raise BadInput("the table holds no channel besides time", remedy="Add columns such as 'body_rate_x [rad/s]'.")
     epoch_ns = origin if origin is not None else (whole_second(times[0][0]) if dated else 0)
@@ -278,7 +287,5 @@ def read_exclusions(path, telemetry: Telemetry) -> list[Exclusion]:
                 raise BadInput(what, line=table.line(row), remedy="Every exclusion says from when, to when and why.")
             found.append(Exclusion(entry["channel"] or "*", start, stop, entry["reason"]))
     except BadInput as why:
-        if why.file is not None:
-            raise
-        raise BadInput(why.what, remedy=why.remedy, file=path, channel=why.channel, line=why.line) from None
+        raise why.within(path) from None
     return found

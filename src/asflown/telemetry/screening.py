@@ -188,9 +188,8 @@ def _second_differences(c: Channel) -> np.ndarray:
 def quantisation_step(values: np.ndarray) -> float:
     """The step all values are multiples of, from their smallest differences. SI; 0 where none shows."""
     levels = np.unique(values)
-    scale = float(np.max(np.abs(levels))) if len(levels) else 0.0
     steps = np.diff(levels)
-    steps = steps[steps > 1e-12 * scale]
+    steps = steps[steps > 1e-12 * np.maximum(np.abs(levels[1:]), np.abs(levels[:-1]))]
     if len(steps) == 0:
         return 0.0
     smallest = float(np.min(steps))
@@ -250,6 +249,9 @@ def _without_stuck(c: Channel) -> tuple[Channel, list[Finding]]:
     """A noisy sensor that says one value for a long run."""
     if c.kind.stem not in _MEASURED or len(c.values) < 3 * STUCK_RUN:
         return c, []
+    if (c.values == c.values[0]).all():
+        detail = f"one value throughout, {c.values[0]:g}: a dead sensor, or nothing moves by one count? Still used"
+        return c, [Finding(c.name, "still", len(c.values), int(c.tai_ns[0]), detail)]
     stuck, still = np.zeros(len(c.values), bool), np.zeros(len(c.values), bool)
     step = quantisation_step(c.values)
     for start, stop in _runs(np.diff(c.values) == 0):

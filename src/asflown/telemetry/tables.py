@@ -11,6 +11,7 @@ import gzip
 import os
 import re
 import zlib
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
@@ -23,14 +24,13 @@ from ..kit.errors import BadInput, some_of
 from ..kit.quantities import si_factor
 from ..kit.timeline import NS, et_to_tai_ns, gps_to_tai_ns, utc_label, utc_to_tai_ns
 from .channels import split_header
-from .telemetry import Telemetry
+from .telemetry import LONGEST_S, Telemetry
 
 #: Time scales a column may be written in.
 SCALES = ("s", "utc", "gps s", "et s", "unix s")
 
 _EPOCH_COMMENT = re.compile(r"^#\s*epoch\s*[:=]\s*(.*?)\s*$", re.IGNORECASE)
 _YEARS = range(1960, 2250)  # UTC begins in 1960; int64 nanoseconds end in 2292
-_LONGEST_S = 4_000_000_000  # seconds from any origin that int64 nanoseconds hold with room to spare
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ def times_of(table: Table, column: int, scale: str, origin_ns: int = 0) -> np.nd
     for row, cell in enumerate(cells.tolist() if isinstance(cells, np.ndarray) else cells):
         try:
             seconds = Decimal(cell if isinstance(cell, str) else repr(cell))
-            if not abs(seconds) < _LONGEST_S:  # also NaN
+            if not abs(seconds) < LONGEST_S:  # also NaN
                 raise InvalidOperation
             ns[row] = int((seconds * NS).to_integral_value())
         except (InvalidOperation, ValueError):
@@ -195,19 +195,27 @@ def read_csv(data: bytes) -> Table:
     if not numbered:
         raise BadInput("there is no header line", remedy="The first line names the columns, as in 'time [s],body_rate_x [rad/s]'.")  # fmt: skip
     lines = [n for n, _ in numbered]
-    rows, reader = [], csv.reader((line for _, line in numbered), strict=True, skipinitialspace=True)
+    rows: list[list[str]] = []
+    reader = csv.reader((line for _, line in numbered), strict=True, skipinitialspace=True)
     try:
         for row in reader:
-            rows.append(row)
-            if reader.line_num != len(rows):
+            if reader.line_num != len(rows) + 1:
                 raise csv.Error("a quotation mark is never closed")
+            rows.append(row)
     except csv.Error as why:
         raise BadInput(
             f"this line cannot be read ({why})",
-            line=lines[min(len(rows) - (reader.line_num != len(rows)), len(lines) - 1)],
+            line=lines[min(len(rows), len(lines) - 1)],
             remedy="Write comma-separated cells; quotation marks come in pairs, within one line.",
         ) from None
     headings = [h.strip() for h in rows[0]]
+    other = next((w for s, w in ((";", "semicolons"), ("\t", "tabs"), ("|", "bars")) if s in headings[0]), None)
+    if len(headings) == 1 and other:
+        raise BadInput(
+            f"the cells are divided by {other}",
+            line=lines[0],
+            remedy="Save the table with commas between its cells and points as decimal signs.",
+        )
     while len(headings) > 1 and headings[-1] == "" and all(len(r) == len(rows[0]) and not r[-1].strip() for r in rows):
         headings.pop()  # a comma at the end of every line
         rows = [r[:-1] for r in rows]
@@ -244,7 +252,7 @@ def _text(data: bytes) -> str:
 
 
 def _checked(table: Table) -> Table:
-    twice = sorted({h for h in table.headings if h and table.headings.count(h) > 1})
+    twice = sorted(h for h, times in Counter(table.headings).items() if h and times > 1)
     if twice:
         raise BadInput(f"the header names a column twice: {some_of(twice)}", remedy="Keep one of them, or rename one.")
     if len(table) == 0:

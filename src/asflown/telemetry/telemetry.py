@@ -18,6 +18,8 @@ from .channels import AXES, ChannelKind, kind_of, member_of
 #: Runs of at most this many missing samples are bridged; longer ones are gaps.
 BRIDGED = 5
 
+LONGEST_S = 4_000_000_000  # seconds from any epoch that int64 nanoseconds hold with room to spare
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -122,11 +124,13 @@ class Telemetry:
     def moment(self, text: str | float) -> int:
         """'120' (seconds from the epoch) or a UTC stamp -> ns TAI."""
         try:
-            return self.epoch_ns + round(float(text) * NS)
+            seconds = float(text)
         except ValueError:
-            pass
-        except OverflowError:
-            raise BadInput(f"{text!r} is not a time", remedy="Give seconds from the epoch, or UTC.") from None
+            seconds = None
+        if seconds is not None:
+            if not abs(seconds) < LONGEST_S:  # also NaN
+                raise BadInput(f"{text!r} is not a time", remedy="Give seconds from the epoch, or UTC.")
+            return self.epoch_ns + round(seconds * NS)
         ns = utc_to_tai_ns(str(text))
         if not self.dated:
             raise BadInput(
@@ -155,11 +159,18 @@ class Telemetry:
         first, last = self.span()
         a = self.moment(start) if start is not None else first
         b = self.moment(stop) if stop is not None else last
+        both = start is not None and stop is not None
         if b <= a or a > last or b < first:
+            if both and b <= a:
+                what = f"the window ends ({self.describe_time(b)}) before it starts ({self.describe_time(a)})"
+            elif both:
+                what = f"no data from {self.describe_time(a)} to {self.describe_time(b)}"
+            else:
+                what = (
+                    f"no data {f'after {self.describe_time(a)}' if stop is None else f'before {self.describe_time(b)}'}"
+                )
             raise BadInput(
-                f"no data from {self.describe_time(a)} to {self.describe_time(b)}"
-                if b > a
-                else f"the window ends ({self.describe_time(b)}) before it starts ({self.describe_time(a)})",
+                what,
                 file=self.source or None,
                 remedy=f"The telemetry runs from {self.describe_time(first)} to {self.describe_time(last)}.",
             )

@@ -1,0 +1,17 @@
+"""Compile every kernel once, into numba's cache: ``python -m asflown.cli.prewarm``."""
+
+from __future__ import annotations
+
+
+def prewarm() -> None:
+    """A short flight and its torque by the fused method: all array types the kernels will ever see."""
+    from asflown.craft.load import load_craft
+    from asflown.estimate.torque import disturbance_torque
+    from asflown.sim.fly import fly
+
+    flight = fly("quiet", duration="120 s", settle="0 s")
+    disturbance_torque(flight.telemetry, load_craft("cassini"), method="fused", axis="y")
+
+
+if __name__ == "__main__":
+    prewarm()

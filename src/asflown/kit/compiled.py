@@ -1,0 +1,16 @@
+"""The one door to numba: kernels compile where it is there and run as plain Python where it is not.
+
+Kernels that call each other stand in one module: numba's cache does not notice a callee that changed
+in another file.
+"""
+
+from __future__ import annotations
+
+
+def jit(function):
+    """Compile and cache ``function``; NUMBA_DISABLE_JIT=1, or numba missing, leaves it as it is."""
+    try:
+        from numba import njit
+    except ImportError:
+        return function
+    return njit(cache=True)(function)

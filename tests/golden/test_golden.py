@@ -1,0 +1,32 @@
+"""Texts as a person reads them.  These guard against change and prove nothing; after a wanted change run
+``ASFLOWN_GOLDEN=write pytest tests/golden`` and read the difference."""
+
+import os
+from pathlib import Path
+
+import pytest
+from cli.program import csv_text, flight, run
+
+HERE = Path(__file__).parent
+
+TEXTS = {
+    "torque": ["torque", "t.csv", "--axis", "y"],
+    "torque-printed": ["torque", "t.csv", "--axis", "y", "--variant", "printed"],
+    "telemetry-check": ["telemetry", "check", "t.csv"],
+    "craft-show-cassini": ["craft", "show", "cassini", "--at", "2005-02-09"],
+    "craft-list": ["craft", "list"],
+    "help": ["--help"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_golden_text(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    Path("t.csv").write_text(csv_text(flight()))
+    done = run(*TEXTS[name])
+    assert done.code == 0 and done.err == ""
+    golden = HERE / f"{name}.txt"
+    if os.environ.get("ASFLOWN_GOLDEN") == "write":
+        golden.write_text(done.out)
+    assert done.out == golden.read_text()

@@ -1,0 +1,112 @@
+"""The pages against the code: names, keys and numbers that a reader may rely on."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from asflown.sim import scenario
+from asflown.telemetry import dictionary
+from asflown.telemetry.channels import KINDS
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+MEMBERS = {"axis": r"_x\|y\|z", "component": r"_w\|x\|y\|z", "wheel": "_<WHEEL>", "thruster": "_<THRUSTER>",
+           "mechanism": "[_<MECHANISM>]", "none": ""}  # fmt: skip
+
+
+def page(name: str) -> str:
+    return (DOCS / name).read_text(encoding="utf-8")
+
+
+def section(text: str, heading: str) -> str:
+    return text.split(f"\n## {heading}\n")[1].split("\n## ")[0]
+
+
+def keys_in(text: str) -> set[str]:
+    """Words in code marks in the key column (the second) of the tables."""
+    rows = [line.split(" | ") for line in text.splitlines() if line.startswith("|")]
+    return {k for cells in rows if len(cells) > 2 for k in re.findall(r"`([a-z_]+)`", cells[1])}
+
+
+def code_blocks(text: str, language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", text, re.S)
+
+
+def test_telemetry_page_lists_every_channel_kind():
+    """On a failure: this is the table to paste."""
+    rows = []
+    for k in KINDS:
+        unit = "word" if k.behaves == "state" else (k.unit or "[]")
+        limit = "" if k.plausible is None else f"{k.plausible:g}"
+        rows.append(f"| `{k.stem}{MEMBERS[k.member]}` | {unit} | {k.meaning} | {limit} | {k.mistaken_for} |")
+    written = [x for x in section(page("telemetry.md"), "The names").splitlines() if x.startswith("| `")]
+    assert written == rows
+
+
+def test_telemetry_page_lists_every_key_of_a_channel_dictionary():
+    models = (dictionary.TimeColumn, dictionary.ChannelEntry, dictionary.QuaternionEntry, dictionary.OrbitEntry,
+              dictionary.LongEntry)  # fmt: skip
+    assert keys_in(section(page("telemetry.md"), "A channel dictionary")) == {k for m in models for k in m.model_fields}
+
+
+def test_telemetry_pages_examples_are_read(tmp_path):
+    from asflown.telemetry.load import load_telemetry
+
+    text = page("telemetry.md")
+    (tmp_path / "own.csv").write_text(code_blocks(section(text, "A table that describes itself"), "")[0])
+    t = load_telemetry(tmp_path / "own.csv")
+    assert set(t.channels) == {"wheel_rate_RWA1", "body_rate_y", "attitude_error_y", "motor_on"}
+    assert len(t.channel("attitude_error_y").values) == 3 and len(t.channel("body_rate_y").values) == 2
+
+    (tmp_path / "dict.toml").write_text(code_blocks(text, "toml")[0])
+    (tmp_path / "counts.csv").write_text(
+        "SCET,WHL1,GYR_Y,Q1,Q2,Q3,Q4\n"
+        + "".join(f"2015-272T00:00:{4 * i:02d},{15000 + i},{i + 2},0,0,0,1\n" for i in range(5))
+    )
+    t = load_telemetry(tmp_path / "counts.csv", channels=tmp_path / "dict.toml")
+    assert t.channel("wheel_rate_RWA1").values[0] == pytest.approx(600 * 3.14159265 / 30)
+    assert t.channel("body_rate_y").values[0] == 0 and t.channel("quaternion_w").values[0] == 1
+
+    exclusions = code_blocks(section(text, "Exclusions"), "")[0]
+    assert exclusions.splitlines()[0] == "start,stop,channel,reason"
+
+
+def test_simulator_page_lists_every_scenario_key():
+    models = (scenario.Scenario, scenario.Triangles, scenario.Constant, scenario.Table, scenario.Plume, scenario.Slew,
+              scenario.CoverMotion, scenario.Controller, scenario.Sampling, scenario.Gap)  # fmt: skip
+    tables = {"slews", "cover", "controller", "telemetry", "gaps"}  # named in the first column
+    fields = {k for m in models for k in m.model_fields} - tables
+    text = section(page("simulator.md"), "Scenario keys")
+    assert keys_in(text) == fields
+    assert all(re.search(rf"\[[a-z.\[]*{t}\]", text) for t in tables | {"torques"})
+
+
+def test_simulator_page_lists_the_shipped_scenarios_and_its_example_flies(tmp_path):
+    text = page("simulator.md")
+    listed = re.findall(r"^\| `([a-z0-9-]+)`", section(text, "Shipped scenarios"), re.M)
+    assert sorted(listed) == scenario.shipped_scenarios()
+    example = code_blocks(text, "toml")[0]
+    assert tomllib.loads(example)
+    (tmp_path / "mine.toml").write_text(example)
+    assert scenario.load_scenario(tmp_path / "mine.toml").telemetry.dropout == 0.05
+
+
+def test_simulator_page_gives_the_noise_table():
+    from asflown.sim.sensors import NOISE
+
+    rows = [[c.strip() for c in x.split("|")[2:-1]] for x in section(page("simulator.md"), "Noise").splitlines()
+            if x.startswith("| ")][1:]  # fmt: skip
+    for column, name in enumerate(("half", "nominal", "double")):
+        n = NOISE[name]
+        values = (1e6 * n.attitude_white_rad, 1e6 * n.attitude_coloured_rad, 1e6 * n.gyro_rad_s, n.wheel_rad_s)
+        assert [float(r[column]) for r in rows] == pytest.approx(values)
+
+
+def test_every_picture_and_page_linked_is_there_and_small():
+    for file in DOCS.rglob("*.md"):
+        for target in re.findall(r"\]\(([^)#:]+)\)", file.read_text(encoding="utf-8")):
+            path = file.parent / target
+            assert path.is_file(), f"{file.name} links to {target}"
+            if path.suffix in (".png", ".svg"):
+                assert path.stat().st_size < 150_000, target
