@@ -38,6 +38,15 @@ class Subject:
     def relative(self) -> bool:
         return any(w.spin_inertia is None for w in self.craft.wheels)
 
+    def known_inertia(self) -> np.ndarray:
+        """Raises BadInput where the craft's inertia is not known."""
+        if self.inertia_kgm2 is None:
+            raise BadInput(
+                f"the inertia of {self.craft.craft.name} is not known, and this method needs it",
+                remedy='Give it: --inertia "Ixx,Iyy,Izz,Ixy,Ixz,Iyz" in kg m2.',
+            )
+        return self.inertia_kgm2
+
     def controller(self):
         k = self.craft.craft.wheel_controller
         if k is None:

@@ -35,19 +35,22 @@ def disturbance_torque(
 
     ``method``: 'momentum' (000 eqs 2-9), 'transfer' (000 eqs 10-20; ``model`` low, hankel or full),
     'polynomial' (004 eqs 7, 17, 18; ``order`` 6, 12, 15 or 18) or 'fused' (all channels at once; ``prior``
-    edges or smooth).  ``variant``: 'corrected', or
-    'printed', the paper's way with its faults.  ``window_s``: full width of the corrected methods'
-    local fits, in place of the studied ones.  ``moving``: see ``subject_of``.
+    edges or smooth).  ``variant``: 'corrected', or 'printed', the paper's way with its faults.  ``window_s``:
+    full width of the corrected methods' local fits, in place of the studied one.  ``moving``: see
+    ``subject_of``.
 
     Positive torque turns the body about +axis.  Raises BadInput where the telemetry lacks what the
     method needs, names wheels the craft does not have, or is shorter than the window."""
     _check(method, METHODS, "method")
     _check(variant, VARIANTS, "variant")
+    _check(prior, torque_fused.PRIORS, "prior")
     _check(axis, (*AXES, "all"), "axis")
     if model is not None:
         _check(model, torque_transfer.MODELS, "model")
     if window_s is not None and not 0 < window_s < 1e9:
         raise BadInput(f"a window of {window_s} s is not possible", remedy="Give a positive number of seconds.")
+    if method == "fused" and variant == "printed":
+        raise BadInput("the fused method is in no paper", remedy="Leave --variant out.")
     _check(order, torque_polynomial.ORDERS, "order")
     if model is not None and method in ("momentum", "fused"):
         raise BadInput(
@@ -93,8 +96,6 @@ def _run(subject: Subject, method, variant, axis, model, order, window_s, prior)
     if method == "polynomial":
         return torque_polynomial.polynomial(subject, order, model or "low")
     if method == "fused":
-        if variant == "printed":
-            raise BadInput("the fused method is in no paper", remedy="Leave --variant out.")
         *answer, paths = torque_fused.fused(subject, prior, (0, 1, 2) if axis == "all" else (AXES.index(axis),))
         return (*answer, (), paths)
     module = {"momentum": torque_momentum, "transfer": torque_transfer}[method]

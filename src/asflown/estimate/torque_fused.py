@@ -29,7 +29,7 @@ from ..kit.smoother import Measurements, Model, draw, log_likelihood, smooth
 from ..kit.timeline import NS
 from ..telemetry.channels import AXES
 from .latent_loop import MOMENTUM, RATE, SLOPE, TORQUE, Body, Levels, Series, Times, arrange
-from .subject import Grid, Subject, grid_for
+from .subject import Grid, Subject, grid_for, slews
 from .torque_momentum import actuators, gap_doubts, splined
 
 PRIORS = ("edges", "smooth")
@@ -40,6 +40,8 @@ JUMP_FREEDOM = 0.3
 PATHS, BURN_IN = 240, 60
 _ROUNDS = 8
 _SEED = 20160913
+#: Fewest samples a channel needs, and most instants of one pass.
+_LEAST, _LONGEST = 25, 20_000
 
 #: Width of the weak log-normal priors, in the order of Levels.
 _SPREAD = np.array([1.5, 0.8, 0.7, 0.7, 0.7, 1.0, 0.7, 1.5])
@@ -84,7 +86,7 @@ def fused(subject: Subject, prior: str = "edges", axes: tuple[int, ...] = (0, 1,
     if prior not in PRIORS:
         raise BadInput(f"prior {prior!r} is not known", remedy=f"Choose one of: {some_of(PRIORS)}.")
     grid, series, start_Nms, doubts = _gather(subject, axes)
-    I_B, controller = subject.inertia_kgm2, subject.controller()
+    I_B, controller = subject.known_inertia(), subject.controller()
     random = np.random.default_rng(seed).spawn(3)
     solved = {}
     for j in axes:
@@ -188,16 +190,34 @@ def _jump_scales(model: Model, data: Measurements) -> tuple[np.ndarray, float]:
 def _gather(subject: Subject, axes):
     """Series of every axis from the grid's start; the wheels' momentum there; what to doubt."""
     tlm = subject.telemetry
-    if subject.inertia_kgm2 is None or subject.relative:
+    if subject.relative:
+        raise BadInput("the fused method needs wheels of known spin inertia", remedy="Use --method momentum.")
+    if slews(tlm):
         raise BadInput(
-            "the fused method needs inertia in kg m2 and wheels of known spin inertia", remedy="Use --method momentum."
+            "the craft slews, and the loop's commanded motion is not in the telemetry",
+            remedy="The fused method needs a hold: narrow the window with --start and --stop, or use --method momentum.",
         )
     names = [f"{stem}_{AXES[j]}" for stem in ("attitude_error", "body_rate") for j in axes]
     channels = [tlm.channel(n) for n in names]
     stored, pushed, _ = actuators(subject)
     if pushed:
         raise BadInput("the fused method needs wheel rates or wheel momentum", remedy="Use --method momentum.")
-    grid = grid_for([*channels, *[c for c, _ in stored]])
+    everything = [*channels, *[c for c, _ in stored]]
+    grid = grid_for(everything)
+    if grid.count > _LONGEST:
+        raise BadInput(
+            f"{grid.count} instants are too many for one fused pass",
+            remedy=f"Take at most {_LONGEST} s with --start and --stop.",
+        )
+    for c in everything:
+        u = c.usable.values
+        if len(u) < _LEAST or np.ptp(u) == 0:
+            why = "never changes" if len(u) >= _LEAST else f"has {len(u)} usable samples, fewer than {_LEAST}"
+            raise BadInput(
+                f"this channel {why}: the fused method cannot fit its noise",
+                channel=c.name,
+                remedy="Take a longer window, or use --method momentum.",
+            )
     doubts: list[str] = []
     t, h = _momentum(stored, grid, doubts)
     first = h[0].copy()
@@ -210,7 +230,7 @@ def _gather(subject: Subject, axes):
             inside = (s >= 0) & (s <= grid.seconds[-1] + 1e-6)
             series[j].append(Series(row, s[inside], u.values[inside]))
         series[j].append(Series(2, t, h[:, j] - first[j]))
-    silent = {}
+    silent: dict[tuple[float, float], str] = {}
     for c in [*channels, *[c for c, _ in stored]]:
         u = c.usable
         s = (u.tai_ns - np.int64(grid.start_ns)) / NS
@@ -239,7 +259,7 @@ def _momentum(stored, grid: Grid, doubts: list[str]):
     times = (lead.tai_ns - np.int64(grid.start_ns)) / NS
     times = times[(times >= 0) & (times <= grid.seconds[-1])]
     fine = Grid(grid.start_ns, 0.125, int(grid.seconds[-1] * 8) + 1)
-    h = sum(np.outer(np.interp(times, fine.seconds, splined(c, fine)), d) for c, d in stored)
+    h = np.sum([np.outer(np.interp(times, fine.seconds, splined(c, fine)), d) for c, d in stored], axis=0)
     known = np.isfinite(h).all(axis=1)
     return times[known], h[known]
 

@@ -119,8 +119,7 @@ def _from_error(subject: Subject, errors: dict[int, str], model: str):
     tlm, k = subject.telemetry, subject.controller()
     if not errors:
         tlm.channel("attitude_error_y")
-    if subject.inertia_kgm2 is None:
-        raise BadInput("the craft's inertia is not known", remedy="Give it with --inertia.")
+    inertia = subject.known_inertia()
     inverse = hankel_order_two(k) if model == "hankel" else low_order(k)
     grid: Grid = grid_for([tlm.channel(n) for n in errors.values()])
     torque = np.full((grid.count, 3), np.nan)
@@ -135,7 +134,7 @@ def _from_error(subject: Subject, errors: dict[int, str], model: str):
             q, _, _ = _fit((r.tai_ns - np.int64(grid.start_ns)) / NS, r.values, 6)
             rate, how = q(at) - k.kp_per_s * e, "controller_rate_error less KP e"
         torque[:, j] = (
-            -subject.inertia_kgm2[j, j] / inverse.gain
+            -inertia[j, j] / inverse.gain
             * (acceleration + inverse.damping_per_s * rate + inverse.stiffness_per_s2 * e)
         )  # fmt: skip
     return grid, torque, how

@@ -36,7 +36,7 @@ _RATE_OF_A_SLEW = 5e-4  # rad/s: above it the record is no hold
 
 def printed(subject: Subject, model: str = "low"):
     """The paper's way. Returns grid, torque (M, 3), None, None, settings, doubts; NaN for axes without e."""
-    I_B = _inertia(subject)
+    I_B = subject.known_inertia()
     inverse = _second_order(subject, model)
     channels = _errors(subject)
     grid = grid_for(list(channels.values()), step_s=1.0)
@@ -66,7 +66,7 @@ def corrected(subject: Subject, model: str = "full", window_s: float | None = No
     an inverse put together from them is late by up to 2 s on 10-s excursions.  The rate error is taken
     from telemetry where it is there: controller_rate_error (000 eq 17, 004 eq 8), which has already gone
     through the filter, or rate_error.  Returns as ``printed``, with sigma (M, 3)."""
-    I_B = _inertia(subject)
+    I_B = subject.known_inertia()
     tlm, k = subject.telemetry, subject.controller()
     width = ERROR_HALF_WIDTH_S if window_s is None else window_s / 2
     channels = _errors(subject)
@@ -162,15 +162,6 @@ def _noise_gain(loop: _Inverse, channel, grid: Grid, half_width_s: float, f) -> 
         squares.append(np.sum((acceleration + push) ** 2))
     curvature = f.fit.gain[:, 2, 2]
     return np.mean(squares) * grid.step_s / cadence * np.maximum(1.0, curvature / np.nanmedian(curvature))
-
-
-def _inertia(subject: Subject) -> np.ndarray:
-    if subject.inertia_kgm2 is None:
-        raise BadInput(
-            f"the inertia of {subject.craft.craft.name} is not known, and the transfer method needs it",
-            remedy='Give it: --inertia "Ixx,Iyy,Izz,Ixy,Ixz,Iyz" in kg m2.',
-        )
-    return subject.inertia_kgm2
 
 
 def _errors(subject: Subject) -> dict:
