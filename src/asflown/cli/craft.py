@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import typer
 
+from .options import JSON, hashes
 from .output import plain, print_doubts, print_json, provenance, wrapped
 
 app = typer.Typer(help=__doc__, rich_markup_mode=None)
-JSON = typer.Option(False, "--json", help="One JSON object on standard output.")
 
 
 @app.command("list")
@@ -43,7 +43,8 @@ def show(
     now = c.at(utc_to_tai_ns(at) if at is not None else None)
     if json:
         print_json(
-            _record(c, now, at) | {"command": "craft show", "provenance": provenance({}, {"craft": name, "at": at})}
+            _record(c, now, at)
+            | {"command": "craft show", "provenance": provenance(hashes(name), {"craft": name, "at": at})}
         )
         return
     print(f"{c.name}: {c.description}" + (f", on {at}" if at else ""))
@@ -88,7 +89,9 @@ def check(file: str = typer.Argument(help="A craft TOML file."), json: bool = JS
     c = load_craft(file)
     now = c.at(None)
     if json:
-        print_json(_record(c, now, None) | {"command": "craft check", "provenance": provenance({}, {"craft": file})})
+        print_json(
+            _record(c, now, None) | {"command": "craft check", "provenance": provenance(hashes(file), {"craft": file})}
+        )
         return
     print(f"{file}: a valid craft ({c.name}; wheels: {len(c.wheel_names)}, thrusters: {len(c.thrusters)}, "
           f"mass properties: {len(c.mass_properties)})")  # fmt: skip

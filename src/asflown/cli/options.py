@@ -30,14 +30,16 @@ def craft_from(name: str, inertia: str | None, cm: str | None):
     )
 
 
+def hashes(*files) -> dict[str, str]:
+    """SHA-256 of every file named, for the provenance; what is no file (a built-in name, None) is passed over."""
+    from asflown.kit.files import sha256_of
+
+    return {str(f): sha256_of(Path(f).read_bytes()) for f in files if f is not None and Path(f).is_file()}
+
+
 def telemetry_from(file: Path, channels, exclude, start, stop, craft):
     """Telemetry through the door, cut to the window.  Returns it and the inputs' SHA-256."""
-    from asflown.kit.files import sha256_of
     from asflown.telemetry.load import load_telemetry
 
     whole = load_telemetry(file, channels=channels, exclude=exclude, craft=craft)
-    inputs = {whole.source: whole.sha256}
-    for other in (channels, exclude):
-        if other is not None:
-            inputs[str(other)] = sha256_of(Path(other).read_bytes())
-    return whole.between(start, stop), inputs
+    return whole.between(start, stop), {whole.source: whole.sha256} | hashes(channels, exclude)

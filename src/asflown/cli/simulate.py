@@ -6,6 +6,7 @@ from pathlib import Path
 
 import typer
 
+from .options import CM, INERTIA, JSON, craft_from, hashes
 from .output import print_doubts, print_json, progress, provenance
 
 
@@ -15,24 +16,18 @@ def simulate(
     craft: str = typer.Option(None, "--craft", help="A built-in craft or a TOML file, instead of the scenario's."),
     seed: int = typer.Option(None, "--seed", min=0, help="Another draw of the noise."),
     noise: str = typer.Option(None, "--noise", help="none, half, nominal or double."),
-    inertia: str = typer.Option(None, "--inertia", help="Ixx,Iyy,Izz,Ixy,Ixz,Iyz [kg m2], used as given."),
-    cm: str = typer.Option(None, "--cm", help="x,y,z [m], centre of mass in the thruster positions' origin."),
-    json: bool = typer.Option(False, "--json", help="One JSON object on standard output."),
+    inertia: str = INERTIA,
+    cm: str = CM,
+    json: bool = JSON,
 ) -> None:
     """Fly a scenario in the closed loop: telemetry as a spacecraft would send it, and the truth beside it."""
-    from asflown.craft.load import load_craft
     from asflown.kit.files import check_folder
-    from asflown.kit.quantities import plain_numbers
     from asflown.sim.fly import fly, write_flight
     from asflown.sim.scenario import load_scenario
 
     check_folder(out)
     plan = load_scenario(scenario)
-    vehicle = load_craft(
-        craft or plan.craft,
-        inertia=plain_numbers(inertia, 6, "--inertia") if inertia is not None else None,
-        cm=plain_numbers(cm, 3, "--cm") if cm is not None else None,
-    )
+    vehicle = craft_from(craft or plan.craft, inertia, cm)
     flight = fly(plan, craft=vehicle, seed=seed, noise=noise, progress=progress())
     files = write_flight(flight, out)
     options = {"craft": craft, "noise": noise, "inertia": inertia, "cm": cm}
@@ -44,7 +39,7 @@ def simulate(
             "seed": flight.seed,
             "ended": flight.ended,
             "doubts": list(flight.doubts),
-            "provenance": provenance({}, options, flight.seed),
+            "provenance": provenance(hashes(scenario, craft), options, flight.seed),
         })  # fmt: skip
         return
     print(f"{flight.scenario.name}: {flight.ended} (seed {flight.seed}, noise {flight.scenario.noise})")

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import typer
 
+from .options import CHANNELS, CM, EXCLUDE, INERTIA, JSON, START, STOP, craft_from, hashes, telemetry_from
 from .output import print_doubts, print_json, provenance
 
 app = typer.Typer(help=__doc__, rich_markup_mode=None)
-JSON = typer.Option(False, "--json", help="One JSON object on standard output.")
 
 
 @app.command(short_help="What a file holds, and what is wrong with it.")
 def check(
-    file: str = typer.Argument(help="CSV (plain or gzip), Parquet, NetCDF or HDF5."),
-    channels: str = typer.Option(None, "--channels", metavar="DICT", help="A channel dictionary (TOML)."),
-    exclude: str = typer.Option(None, "--exclude", help="Spans not to use: CSV with start, stop, channel, reason."),
+    file: Path = typer.Argument(help="CSV (plain or gzip), Parquet, NetCDF or HDF5."),
+    channels: Path = CHANNELS,
+    exclude: Path = EXCLUDE,
     craft: str = typer.Option(None, "--craft", help="A craft, whose wheel rate limits sharpen the guard on units."),
-    start: str = typer.Option(None, "--start", help="From here: seconds from the epoch, or UTC."),
-    stop: str = typer.Option(None, "--stop", help="Up to here: seconds from the epoch, or UTC."),
+    inertia: str = INERTIA,
+    cm: str = CM,
+    start: str = START,
+    stop: str = STOP,
     json: bool = JSON,
 ) -> None:
     """What a telemetry file holds, channel by channel, and what is wrong with it.
@@ -25,17 +29,17 @@ def check(
     Exit code 3 where the data need a look before use: a doubted unit, spikes, a stuck sensor, an
     undeclared wrap, quaternions not of length one, one time stamp with two different values.
     Dropouts, gaps, repeats, duplicates and late samples are reported and respected, exit code 0."""
-    from asflown.craft.load import load_craft
-    from asflown.telemetry.load import load_telemetry
     from asflown.telemetry.screening import needs_a_look, summaries
 
-    t = load_telemetry(file, channels=channels, exclude=exclude, craft=load_craft(craft) if craft else None)
-    t = t.between(start, stop)
+    ship = craft_from(craft, inertia, cm) if craft else None
+    t, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
     lines = summaries(t)
     if json:
-        options = {"channels": channels, "exclude": exclude, "craft": craft, "start": start, "stop": stop}
+        options = {"channels": channels, "exclude": exclude, "craft": craft, "inertia": inertia, "cm": cm, "start": start,
+                   "stop": stop}  # fmt: skip
         print_json(
-            _record(t, lines) | {"command": "telemetry check", "provenance": provenance({file: t.sha256}, options)}
+            _record(t, lines)
+            | {"command": "telemetry check", "provenance": provenance(inputs | hashes(craft), options)}
         )
     else:
         _print(t, lines)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from .options import CHANNELS, CM, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP, craft_from, telemetry_from
+from .options import CHANNELS, CM, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP, craft_from, hashes, telemetry_from
 from .output import print_doubts, print_json, provenance, say
 
 
@@ -66,7 +66,7 @@ def torque(
         "craft": craft, "method": method, "variant": variant, "axis": axis, "model": model, "order": order, "window_s": window, "prior": prior,
         "moving": moving, "start": start, "stop": stop, "inertia": inertia, "cm": cm,
     }  # fmt: skip
-    origin = provenance(inputs, options)
+    origin = provenance(inputs | hashes(craft), options)
     if out is not None:
         from asflown.estimate.result import save_csv
 

@@ -102,7 +102,10 @@ class TorqueResult:
                 continue
             band = "" if self.sigma_Nm is None else f"   1 sigma {np.nanmedian(self.sigma_Nm[:, j]):.2g}"
             lines.append(f"  {AXES[j]}   mean {np.nanmean(t):+.3g}   rms {np.sqrt(np.nanmean(t**2)):.3g}{band}")
-            lines += [f"      peak {p.torque_Nm:+.4g} at {p.time_s:.0f} s" for p in find_peaks(self, j)[:12]]
+            peaks = find_peaks(self, j)
+            lines += [f"      peak {p.torque_Nm:+.4g} at {p.time_s:.0f} s" for p in peaks[:12]]
+            if len(peaks) > 12:
+                lines.append(f"      and {len(peaks) - 12} more peaks")
         for f in self.fits:
             if f["axis"] in self.axis or self.axis == "all":
                 rms = next(v for k, v in f.items() if k.startswith("rms_") and k != "rms_percent")

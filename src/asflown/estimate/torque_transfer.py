@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
+from ..craft.model import WheelController
 from ..dynamics.loop import SecondOrder, filtered_rate, hankel_order_two, low_order
 from ..kit.errors import BadInput, some_of
 from ..kit.regression import LocalFit, local_polynomial
@@ -84,7 +85,8 @@ def corrected(subject: Subject, model: str = "full", window_s: float | None = No
             r = fit_on_grid(rate_channels[j], grid, degree=3, half_width_s=width)
             silent |= {g: rate_channels[j].name for g in r.gaps}
             told, extra = r.fit.value, k.kd_per_s**2 * r.variance([1, 0, 0])
-        loop = _Inverse(k, inverse, grid.step_s, None if told is None else rate_channels[j].kind.stem)
+        stride = max(1, round(channel.cadence_ns / NS / grid.step_s))
+        loop = _Inverse(k, inverse, grid.step_s, stride, None if told is None else rate_channels[j].kind.stem)
         acceleration[:, j], push[:, j], rate[:, j] = loop.apply(f.fit.value, told)
         stiff = k.kp_per_s * k.kd_per_s
         widened = f.widened @ np.square([stiff, k.kd_per_s, 1.0])
@@ -112,11 +114,14 @@ def corrected(subject: Subject, model: str = "full", window_s: float | None = No
 class _Inverse:
     """The inverse of the loop as a linear operator on smoothed attitude error, stretch by stretch.
 
-    ``rate_channel``: None (differentiate e), 'rate_error' or 'controller_rate_error'."""
+    ``stride``: instants between samples.  The curve to differentiate goes through instants of one phase
+    to the samples only: a local fit's noise depends on that phase, and a curve through all of them
+    would ripple.  ``rate_channel``: None (differentiate e), 'rate_error' or 'controller_rate_error'."""
 
-    controller: object
+    controller: WheelController
     second_order: SecondOrder | None
     step_s: float
+    stride: int = 1
     rate_channel: str | None = None
 
     def apply(self, e: np.ndarray, told: np.ndarray | None = None):
@@ -125,15 +130,18 @@ class _Inverse:
         known = np.isfinite(e) & (True if told is None else np.isfinite(told))
         edges = np.flatnonzero(np.diff(np.concatenate([[0], known.astype(int), [0]])))
         for a, b in zip(edges[::2], edges[1::2], strict=True):
-            if b - a >= 8:
+            if b - a >= 8 * self.stride:
                 out[:, a:b] = self._stretch(e[a:b], None if told is None else told[a:b])
         return out
 
     def _stretch(self, e, told):
         k = self.controller
-        curve = make_interp_spline(self.step_s * np.arange(len(e)), e, 5)
         at = self.step_s * np.arange(len(e))
-        rate, acceleration = curve(at, 1), curve(at, 2)
+        nodes = np.arange(0, len(e), self.stride)
+        if nodes[-1] != len(e) - 1:
+            nodes = np.append(nodes, len(e) - 1)
+        curve = make_interp_spline(at[nodes], e[nodes], 5)
+        e, rate, acceleration = curve(at), curve(at, 1), curve(at, 2)
         if self.rate_channel == "controller_rate_error":  # F(e') + KP e
             filtered, rate = told - k.kp_per_s * e, told - k.kp_per_s * e
         else:
