@@ -19,7 +19,8 @@ MAY_IMPORT = {
     "sim": {"kit", "craft", "telemetry"},
     "estimate": {"kit", "craft", "telemetry", "dynamics"},
     "plots": {"kit", "craft", "telemetry", "dynamics", "estimate"},
-    "cli": {"kit", "craft", "telemetry", "dynamics", "sim", "estimate", "plots"},
+    "campaigns": {"kit", "craft", "telemetry", "dynamics", "sim", "estimate"},
+    "cli": {"kit", "craft", "telemetry", "dynamics", "sim", "estimate", "plots", "campaigns"},
 }
 
 

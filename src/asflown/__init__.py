@@ -23,6 +23,7 @@ _PUBLIC = {
     "load_scenario": "asflown.sim.scenario",
     "fly": "asflown.sim.fly",
     "write_flight": "asflown.sim.fly",
+    "error_budget": "asflown.campaigns.budget",
 }
 
 __all__ = [*_PUBLIC, "__version__"]
@@ -39,6 +40,7 @@ def __dir__():
 
 
 if TYPE_CHECKING:
+    from asflown.campaigns.budget import error_budget
     from asflown.craft.load import built_in_crafts, load_craft
     from asflown.craft.model import Craft
     from asflown.estimate.compare import compare_torques

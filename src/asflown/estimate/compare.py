@@ -38,7 +38,7 @@ class Comparison:
             self.peak_times_s, self.a_peaks_Nm, self.b_peaks_Nm, self.ratios, self.peak_lags_s, strict=True
         ):
             lines.append(
-                f"      peak at {t:5.0f} s   {x:+.4g} and {y:+.4g} N m   ratio {r:.2f}   {p:+.0f} s between peaks"
+                f"      at {t:6.0f} s {x:+11.4g} and {y:+11.4g} N m   ratio {r:5.2f}   {p:+4.0f} s between peaks"
             )
         return "\n".join(lines)
 

@@ -1,0 +1,172 @@
+"""The error budget: fly a scenario with many seeds, reconstruct the torque, set it against the truth.
+
+000 section VI did this with two profiles, one flight each and one method.  Here every figure comes with
+the Monte-Carlo error that the number of flights leaves it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..craft.model import Craft
+from ..estimate.result import AXES, TorqueResult
+from ..estimate.torque import METHODS, VARIANTS, disturbance_torque
+from ..estimate.truth import against_truth
+from ..kit.errors import BadInput, some_of
+from ..sim.fly import fly
+from ..sim.scenario import Scenario, load_scenario
+
+#: A method by name: its own, corrected, or with "-printed".
+DEFAULT_METHODS = ("momentum-printed", "transfer-printed", "momentum", "transfer", "fused")
+
+#: Within this of a true peak counts as at the corner. [s]
+_CORNER_S = 2.0
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A mean over flights and its own standard error."""
+
+    value: float
+    error: float
+
+    @classmethod
+    def of(cls, samples) -> Figure:
+        x = np.asarray(samples, float)
+        x = x[np.isfinite(x)]
+        if not len(x):
+            return cls(float("nan"), float("nan"))
+        return cls(float(x.mean()), float(x.std(ddof=1) / np.sqrt(len(x))) if len(x) > 1 else float("nan"))
+
+
+@dataclass(frozen=True)
+class BudgetRow:
+    """One method over all flights.  Coverages are shares of instants inside the band; None without a band."""
+
+    method: str
+    rms_Nm: Figure
+    lag_s: Figure
+    peak_lag_s: Figure
+    coverage_68: Figure | None
+    coverage_95: Figure | None
+    corner_coverage_95: Figure | None
+    peak_error_percent: tuple[Figure, ...]
+    failed: int
+
+    def record(self) -> dict:
+        row: dict = {"method": self.method, "failed": self.failed}
+        for name in ("rms_Nm", "lag_s", "peak_lag_s", "coverage_68", "coverage_95", "corner_coverage_95"):
+            f = getattr(self, name)
+            row[name], row[f"{name}_mc"] = (None, None) if f is None else (f.value, f.error)
+        row["peak_error_percent"] = [f.value for f in self.peak_error_percent]
+        row["peak_error_percent_mc"] = [f.error for f in self.peak_error_percent]
+        return row
+
+
+def split_method(name: str) -> tuple[str, str]:
+    """'momentum-printed' -> ('momentum', 'printed').  Raises BadInput for a method that is not there."""
+    method, _, variant = name.partition("-")
+    variant = variant or "corrected"
+    if method not in METHODS or variant not in VARIANTS or (method, variant) == ("fused", "printed"):
+        raise BadInput(
+            f"method {name!r} is not known", remedy=f"Choose of: {some_of(METHODS)}, with -printed for the papers' way."
+        )
+    return method, variant
+
+
+def error_budget(
+    scenario: str | Scenario,
+    craft: Craft,
+    methods: Sequence[str] = DEFAULT_METHODS,
+    *,
+    runs: int = 20,
+    seed: int = 0,
+    noise: str | None = None,
+    tick: Callable[[], None] = lambda: None,
+) -> list[BudgetRow]:
+    """Seeds ``seed`` to ``seed + runs - 1``; the axis is that of the scenario's torque.
+
+    A flight that a method cannot reconstruct counts in ``failed``.  Raises BadInput for a scenario
+    without a torque, an unknown method and fewer than two runs."""
+    if runs < 2:
+        raise BadInput(
+            f"{runs} runs have no spread", remedy="Take at least 2; 20 show the first digit, 200 the second."
+        )
+    ways = [split_method(m) for m in methods]
+    plan = load_scenario(scenario) if isinstance(scenario, str) else scenario
+    found: list[list[dict]] = [[] for _ in ways]
+    failed = [0] * len(ways)
+    for k in range(runs):
+        flight = fly(plan, craft=craft, seed=seed + k, noise=noise)
+        axis = _axis(flight)
+        for i, (method, variant) in enumerate(ways):
+            try:
+                result = disturbance_torque(flight.telemetry, craft, method=method, variant=variant, axis=axis)
+                found[i].append(_judge(result, flight, axis))
+            except BadInput:
+                failed[i] += 1
+            tick()
+    return [_row(name, samples, f) for name, samples, f in zip(methods, found, failed, strict=True)]
+
+
+def _axis(flight) -> str:
+    size = np.max(np.abs(flight.truth.torque_Nm), axis=0)
+    if not np.any(size > 0):
+        raise BadInput(
+            f"{flight.scenario.name} has no torque to reconstruct",
+            remedy="Name a scenario with one, such as profile-1.",
+        )
+    return AXES[int(np.argmax(size))]
+
+
+def _judge(result: TorqueResult, flight, axis: str) -> dict:
+    j = AXES.index(axis)
+    time_s, torque = flight.truth.time_s, flight.truth.torque_Nm[:, j]
+    peaks = [(t, v) for t, v, a in flight.truth.peaks if a == axis]
+    errors = against_truth(result, time_s, torque, peaks, axis)
+    sample = {
+        "rms": errors.rms_Nm,
+        "lag": errors.lag_s,
+        "peak_lag": errors.peak_lag_s,
+        "peaks": errors.peak_error_percent,
+    }
+    if result.sigma_Nm is not None:
+        pull = np.abs(result.torque_Nm[:, j] - np.interp(result.time_s, time_s, torque)) / result.sigma_Nm[:, j]
+        pull = np.where(np.isfinite(pull), pull, np.inf)
+        sample |= {"in68": np.mean(pull < 1), "in95": np.mean(pull < 1.96)}
+        if peaks:
+            near = np.min(np.abs(result.time_s[:, None] - [t for t, _ in peaks]), axis=1) <= _CORNER_S
+            sample["corner"] = np.mean(pull[near] < 1.96)
+    return sample
+
+
+def _row(name: str, samples: list[dict], failed: int) -> BudgetRow:
+    def figure(key: str) -> Figure:
+        return Figure.of([s[key] for s in samples])
+
+    def maybe(key: str) -> Figure | None:
+        return figure(key) if samples and key in samples[0] else None
+
+    peaks = np.array([s["peaks"] for s in samples]) if samples else np.empty((0, 0))
+    return BudgetRow(
+        name, figure("rms"), figure("lag"), figure("peak_lag"), maybe("in68"), maybe("in95"), maybe("corner"),
+        tuple(Figure.of(column) for column in peaks.T), failed,
+    )  # fmt: skip
+
+
+def of_rise(scenario: str | Scenario, rise_s: float) -> Scenario:
+    """The scenario with its triangles' rise changed, the record long enough for all of them.
+
+    Raises BadInput for a scenario without triangles."""
+    plan = load_scenario(scenario) if isinstance(scenario, str) else scenario
+    torques = [dict(t) for t in plan.as_written.get("torques", [])]
+    pulses = [t for t in torques if t.get("shape") == "triangles"]
+    if not pulses:
+        raise BadInput(f"{plan.name} has no triangular torque to widen", remedy="Name profile-1 or profile-2.")
+    for t in pulses:
+        t["rise"] = f"{rise_s} s"
+    last = max(60 + 2 * rise_s * int(t.get("count", 1)) for t in pulses)
+    return plan.changed(torques=torques, duration=f"{max(480.0, np.ceil(last / 60 + 1) * 60)} s")
