@@ -66,7 +66,7 @@ def answers(*words) -> None:
         assert done.out == "" and done.err.startswith("error: ") and len(done.err) < 1500
         assert "Traceback" not in done.err
     else:
-        assert done.record and done.err == ""
+        assert done.record and all(line.startswith("not compared, ") for line in done.err.splitlines())
 
 
 @settings(QUIETLY, max_examples=60)
@@ -75,7 +75,7 @@ def test_any_accident_to_a_file_gets_an_answer(seed, count, tmp_path):
     path = tmp_path / "t.csv"
     path.write_bytes(mutated(seed, count))
     answers("telemetry", "check", path, "--json")
-    method = ["momentum", "transfer", "polynomial"][seed % 3]
+    method = ["momentum", "transfer", "polynomial"][seed % 3]  # fused comes in with --compare, in the slow campaign
     answers("torque", path, "--json", "--method", method, "--variant", ["corrected", "printed"][seed // 3 % 2])
 
 
@@ -90,7 +90,7 @@ def test_any_value_of_an_option_gets_an_answer(option, value, tmp_path):
 
 
 @pytest.mark.slow
-@settings(QUIETLY, max_examples=3000)
+@settings(QUIETLY, max_examples=1200)
 @given(seed=st.integers(0, 10**9), count=st.integers(1, 8))
 def test_any_accident_many_times(seed, count, tmp_path):
     path = tmp_path / "t.csv"

@@ -148,11 +148,18 @@ def _solve_axis(body: Body, fit: AxisFit, grid: Grid, prior: str, rng: np.random
         values = np.where(data.row == 2, data.value * (1 + share), data.value) if name == "spin_inertia" else data.value
         answer = smooth(changed, replace(data, value=values))
         variance = variance + (other.inertia_kgm2 * answer.mean[wanted, TORQUE] - here) ** 2
+    rate_variance = best.covariance[wanted, RATE, RATE]
+    sound = np.isfinite(best.whitened).all() and np.isfinite(mean).all() and rate_variance.min() >= 0
+    if not (sound and np.isfinite(variance).all() and variance.min() > 0):
+        raise BadInput(
+            "the loop's model cannot be fitted to this record: its covariance lost its meaning",
+            remedy="Look for values of impossible size (asflown telemetry check), or use --method momentum.",
+        )
     F, _, _ = body.dynamics(fit.levels, edges)
     return Axis(
         fit, paths, mean, variance,
         best.mean[wanted, RATE], best.mean[wanted] @ F[RATE], body.inertia_kgm2 * best.mean[wanted, MOMENTUM],
-        best.covariance[wanted, RATE, RATE],
+        rate_variance,
     )  # fmt: skip
 
 
@@ -301,7 +308,7 @@ def _fit_axis(body: Body, series: list[Series]) -> AxisFit:
         bounds = list(zip(centre - 4 * _SPREAD, centre + 4 * _SPREAD, strict=True))
         found = optimize.minimize(cost, logs, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60})
         logs = found.x
-        whitened = smooth(body.model(Levels.from_logs(logs), times), data).whitened
+        whitened = np.nan_to_num(smooth(body.model(Levels.from_logs(logs), times), data).whitened)
         bad = np.abs(whitened) > _OUTLYING
         if not bad.any() or bad.mean() > 0.1:
             break

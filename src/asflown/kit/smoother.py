@@ -100,7 +100,9 @@ def smooth(model: Model, data: Measurements) -> Smoothed:
     ll, mean, covariance, innovation, variance, product = _filter(*arrays, True)
     A, _, driven, scale, which, H, _, _, _, start, row, _ = arrays
     drive = _backward(A, driven, scale, which, H, start, row, mean, covariance, innovation, variance, product)
-    return Smoothed(mean, covariance, innovation / np.sqrt(variance), drive, float(ll))
+    # a variance that rounding drove below zero (values of absurd size) shows as NaN, without noise
+    whitened = innovation / np.sqrt(np.where(variance > 0, variance, np.nan))
+    return Smoothed(mean, covariance, whitened, drive, float(ll))
 
 
 def draw(model: Model, data: Measurements, rng: np.random.Generator) -> np.ndarray:
