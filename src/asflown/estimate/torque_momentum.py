@@ -30,9 +30,9 @@ HALF_WIDTH_S = 18.0
 PRINTED_SPAN = 0.08
 
 
-def printed_span(samples: int) -> int:
+def printed_span(samples: int, share: float = PRINTED_SPAN) -> int:
     """Samples in the smoothing window: 8 %, rounded up, made odd (481 -> 39)."""
-    return 2 * (int(np.ceil(PRINTED_SPAN * samples)) // 2) + 1
+    return 2 * (int(np.ceil(share * samples)) // 2) + 1
 
 
 def printed(subject: Subject):
@@ -65,9 +65,9 @@ def splined_momentum(subject: Subject) -> tuple[Grid, np.ndarray]:
     return grid, wheel_momentum(axes, spin, rates)
 
 
-def smoothed_as_printed(values: np.ndarray) -> tuple[np.ndarray, int]:
-    """Local regression of every column over 8 % of the samples, each stretch without NaN by itself."""
-    span = printed_span(len(values))
+def smoothed_as_printed(values: np.ndarray, share: float = PRINTED_SPAN) -> tuple[np.ndarray, int]:
+    """Local regression of every column over a share of the samples, each stretch without NaN by itself."""
+    span = printed_span(len(values), share)
     out = np.full_like(values, np.nan)
     known = np.isfinite(values).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], known.astype(int), [0]])))

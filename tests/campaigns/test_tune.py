@@ -1,0 +1,28 @@
+"""The papers' span search, and the two errors it sets against each other."""
+
+import pytest
+
+from asflown import load_craft
+from asflown.campaigns.tune import tune
+from asflown.kit.errors import BadInput
+
+
+def test_published_smoothing_alone_at_eight_percent():
+    """Recomputed from 000: with I w put back, 8 % takes 8.8 % off 30-s peaks and 17.6 % off 15-s ones."""
+    (row,) = tune(load_craft("cassini"), spans=[0.08])
+    assert row.samples == 39
+    assert row.smoothing_percent == pytest.approx([-8.8, -17.6], abs=0.2)  # percent
+    assert row.peak_error_percent == pytest.approx([2.2, 6.2], abs=0.4)
+
+
+def test_law_a_wider_span_takes_more_off():
+    rows = tune(load_craft("cassini"), spans=[0.04, 0.08, 0.12], rises=[15.0])
+    errors = [r.peak_error_percent[0] for r in rows]
+    assert errors[0] > errors[1] > errors[2]
+    assert all(r.smoothing_percent[0] < r.peak_error_percent[0] for r in rows)
+
+
+def test_impossible_spans_are_refused():
+    for bad in ([], [0.0], [0.6]):
+        with pytest.raises(BadInput, match="span"):
+            tune(load_craft("cassini"), spans=bad)
