@@ -4,9 +4,10 @@ import random
 
 import numpy as np
 import pytest
-from cli.program import csv_text, flight, run
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+
+from cli.program import csv_text, flight, run
 
 LINES = csv_text({k: v[:41] for k, v in flight().items()}).splitlines()
 WORDS = ["", " ", "0", "-0.0", "1e5", "-1e-300", "1e59", "1e999", "nan", "inf", "-", "1,5", "1;5", '"', "''", "#", "=1+1", "NULL",

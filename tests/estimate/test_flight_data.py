@@ -5,7 +5,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from conftest import ROOT, flight_data
 
 from asflown.craft.load import load_craft
 from asflown.dynamics.momentum import wheel_momentum
@@ -13,6 +12,7 @@ from asflown.estimate.result import save_csv
 from asflown.estimate.torque import disturbance_torque
 from asflown.telemetry.load import load_telemetry
 from asflown.telemetry.screening import gaps
+from conftest import ROOT, flight_data
 
 sys.path.insert(0, str(ROOT / "studies"))
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import flight_data
 
 from asflown import disturbance_torque, fly, load_craft, load_telemetry
 from asflown.estimate.compare import best_lag
 from asflown.estimate.latent_loop import CHANNELS, Body, Levels, Series, arrange
 from asflown.estimate.truth import against_truth
 from asflown.kit.errors import BadInput
+from conftest import flight_data
 
 CASSINI = load_craft("cassini")
 

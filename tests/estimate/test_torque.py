@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import flight_data
 
 from asflown import disturbance_torque, fly, load_craft, load_telemetry
 from asflown.estimate.compare import best_lag, compare_torques
@@ -14,6 +13,7 @@ from asflown.estimate.truth import against_truth
 from asflown.kit.errors import BadInput
 from asflown.kit.timeline import NS
 from asflown.telemetry.telemetry import Exclusion
+from conftest import flight_data
 
 from .linear_loop import flown, respond, telemetry, triangles
 

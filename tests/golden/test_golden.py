@@ -5,6 +5,7 @@ import os
 from pathlib import Path
 
 import pytest
+
 from cli.program import csv_text, flight, run
 
 HERE = Path(__file__).parent

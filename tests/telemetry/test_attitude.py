@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import flight_data
-from telemetry.flights import noise, slewing, telemetry_of
 
 from asflown.kit.errors import BadInput
 from asflown.telemetry.attitude import check_attitude
 from asflown.telemetry.load import load_telemetry
 from asflown.telemetry.screening import screen
+from conftest import flight_data
+from telemetry.flights import noise, slewing, telemetry_of
 
 
 def conjugated(t):

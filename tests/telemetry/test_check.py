@@ -4,9 +4,6 @@ import json
 
 import numpy as np
 import pytest
-from conftest import ROOT, flight_data
-from telemetry.flights import noise, telemetry_of
-from telemetry.test_tables import written
 from typer.testing import CliRunner
 
 from asflown.cli.telemetry import app
@@ -15,6 +12,9 @@ from asflown.kit.rotations import rates_between
 from asflown.telemetry.attitude import together
 from asflown.telemetry.load import load_telemetry
 from asflown.telemetry.tables import write_table
+from conftest import ROOT, flight_data
+from telemetry.flights import noise, telemetry_of
+from telemetry.test_tables import written
 
 T = np.arange(0.0, 1000.0, 2.0)
 

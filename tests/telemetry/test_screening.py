@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from telemetry.flights import EPOCH, noise, telemetry_of
 
 from asflown.craft.load import load_craft
 from asflown.kit.errors import BadInput
@@ -17,6 +16,7 @@ from asflown.telemetry.screening import (
     screen,
     summaries,
 )
+from telemetry.flights import EPOCH, noise, telemetry_of
 
 T = np.arange(0.0, 1000.0, 2.0)
 

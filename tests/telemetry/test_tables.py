@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from telemetry.flights import EPOCH, noise, telemetry_of
 
 from asflown.kit.errors import BadInput
 from asflown.kit.timeline import NS, utc_to_tai_ns
 from asflown.telemetry.load import load_telemetry
 from asflown.telemetry.tables import write_table
+from telemetry.flights import EPOCH, noise, telemetry_of
 
 GOOD = """# epoch: 2015-09-29T00:00:00 UTC
 time [s],sclk [],ert [utc],wheel_rate_RWA1 [rpm],body_rate_x [mrad/s],control_mode
