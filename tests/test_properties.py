@@ -91,7 +91,7 @@ def test_any_value_of_an_option_gets_an_answer(option, value, tmp_path):
 
 
 @pytest.mark.slow
-@settings(QUIETLY, max_examples=1200)
+@settings(QUIETLY, max_examples=200)
 @given(seed=st.integers(0, 10**9), count=st.integers(1, 8))
 def test_any_accident_many_times(seed, count, tmp_path):
     path = tmp_path / "t.csv"
