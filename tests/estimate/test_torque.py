@@ -154,6 +154,15 @@ def test_channels_may_be_sampled_at_their_own_phases():
     assert np.abs(e.peak_error_percent).max() < 9
 
 
+def test_the_coarsest_channel_widens_the_window_of_all():
+    """Body rates every 12 s: a window of its own for them would make torques of what wheels and body exchange."""
+    tlm, *_ = LINEAR[1]
+    coarse = {n: c.where(slice(None, None, 3)) if n.startswith("body_rate") else c for n, c in tlm.channels.items()}
+    r = disturbance_torque(replace(tlm, channels=coarse), CASSINI, axis="y")
+    assert r.settings["half_width_s"] == pytest.approx(30.0)
+    assert disturbance_torque(tlm, CASSINI, axis="y", window_s=4.0).settings["half_width_s"] == pytest.approx(10.0)
+
+
 # ---- recovery --------------------------------------------------------------------------------
 
 

@@ -102,7 +102,6 @@ def corrected(subject: Subject, window_s: float | None = None):
     The actuators' momentum comes from wheel rates, from wheel_momentum, or, where only their torque
     is telemetered, from control_torque.  Returns as ``printed``, with sigma (M, 3)."""
     tlm, I_B = subject.telemetry, subject.inertia_kgm2
-    width = HALF_WIDTH_S if window_s is None else window_s / 2
     doubts: list[str] = []
     has_rates = tlm.has_axes("body_rate")
     stored, pushed, spin_doubt = actuators(subject)
@@ -115,6 +114,9 @@ def corrected(subject: Subject, window_s: float | None = None):
     elif I_B is None:
         doubts.append("the craft's inertia is not known: the body's own momentum is left out, only w x h is kept")
     grid = grid_for([c for c, _ in stored] + rates + pushed)
+    # the coarsest channel decides how narrow the common window can be: five samples
+    coarsest = max(c.usable.cadence_ns for c in [c for c, _ in stored] + rates + pushed) / NS
+    width = max(HALF_WIDTH_S if window_s is None else window_s / 2, 2.5 * coarsest)
     wheels = [(fit_on_grid(c, grid, degree=3, half_width_s=width), c, direction) for c, direction in stored]
     body = [(fit_on_grid(c, grid, degree=3, half_width_s=width), c, None if I_B is None else I_B[:, j])
             for j, c in enumerate(rates)]  # fmt: skip
