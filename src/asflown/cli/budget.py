@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from .options import CM, CRAFT, INERTIA, JSON, craft_from, hashes
+from .options import CM, CRAFT, INERTIA, JSON, craft_from, hashes, numbers_of
 from .output import print_json, provenance
 
 
@@ -33,7 +33,6 @@ def budget(
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     from asflown.campaigns.budget import DEFAULT_METHODS, error_budget, of_rise, split_method
-    from asflown.kit.errors import BadInput
     from asflown.sim.scenario import load_scenario
 
     ship = craft_from(craft, inertia, cm)
@@ -41,11 +40,7 @@ def budget(
     for name in names:
         split_method(name)
     plan = load_scenario(scenario)
-    try:
-        rises = [float(w) for w in widths.split(",")] if widths else [None]
-    except ValueError:
-        raise BadInput(f"--widths {widths!r} is not a list of seconds", remedy='Write it as in "5,10,15,30".') from None
-    plans = [(rise, plan if rise is None else of_rise(plan, rise)) for rise in rises]
+    plans = [(w, of_rise(plan, w)) for w in numbers_of(widths, "--widths")] if widths else [(None, plan)]
     tables = []
     with Progress(TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), console=Console(stderr=True),
                   transient=True) as bar:  # fmt: skip

@@ -30,6 +30,16 @@ def craft_from(name: str, inertia: str | None, cm: str | None):
     )
 
 
+def numbers_of(text: str, option: str) -> list[float]:
+    """'5,10,15' -> numbers."""
+    from asflown.kit.errors import BadInput
+
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise BadInput(f"{option} {text!r} is not a list of numbers", remedy='Write it as in "5,10,15".') from None
+
+
 def hashes(*files) -> dict[str, str]:
     """SHA-256 of every file named, for the provenance; what is no file (a built-in name, None) is passed over."""
     from asflown.kit.files import sha256_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from .options import CM, CRAFT, INERTIA, JSON, craft_from, hashes
+from .options import CM, CRAFT, INERTIA, JSON, craft_from, hashes, numbers_of
 from .output import print_json, provenance
 
 
@@ -20,16 +20,10 @@ def tune(
 ) -> None:
     """Search the printed method's smoothing span as the paper did, and show what the best one balances."""
     from asflown.campaigns.tune import SPANS, tune
-    from asflown.kit.errors import BadInput
 
     ship = craft_from(craft, inertia, cm)
-    try:
-        rises = [float(w) for w in widths.split(",")]
-        shares = [float(s) for s in spans.split(",")] if spans else list(SPANS)
-    except ValueError:
-        raise BadInput(
-            "--spans and --widths are lists of numbers", remedy='Write them as in "0.04,0.08" and "30,15".'
-        ) from None
+    rises = numbers_of(widths, "--widths")
+    shares = numbers_of(spans, "--spans") if spans else list(SPANS)
     rows = tune(ship, rises=rises, spans=shares, runs=runs, noise=noise)
     best = min(rows, key=lambda r: r.worst_percent)
     if json:

@@ -10,7 +10,7 @@ import numpy as np
 from ..craft.model import Craft, CraftAt, Wheel
 from ..kit.errors import BadInput, some_of
 from ..kit.regression import LocalFit, local_polynomial, noise_sigma
-from ..kit.timeline import NS, utc_label
+from ..kit.timeline import NS, seconds_since, utc_label
 from ..telemetry.channels import AXES
 from ..telemetry.telemetry import Channel, Telemetry
 
@@ -128,7 +128,7 @@ def thrusters_firing(telemetry: Telemetry) -> list[str]:
 def gaps_on_grid(channel: Channel, grid: Grid) -> list[tuple[float, float]]:
     """Gaps of a channel, from the grid's start. [s]"""
     c = channel.usable
-    t = (c.tai_ns - np.int64(grid.start_ns)) / NS
+    t = grid.of(c.tai_ns)
     return [(float(t[a.stop - 1]), float(t[b.start])) for a, b in pairwise(c.segments())]
 
 
@@ -144,6 +144,10 @@ class Grid:
     def seconds(self) -> np.ndarray:
         """From the grid's own start."""
         return self.step_s * np.arange(self.count)
+
+    def of(self, tai_ns) -> np.ndarray:
+        """Instants as seconds from the grid's start."""
+        return seconds_since(tai_ns, self.start_ns)
 
     def from_epoch(self, telemetry: Telemetry) -> np.ndarray:
         return float(telemetry.seconds(self.start_ns)) + self.seconds
@@ -204,7 +208,7 @@ def fit_on_grid(channel: Channel, grid: Grid, *, degree: int, half_width_s: floa
     Runs of up to five missing samples are bridged: the window widens, and so does the variance.
     Raises BadInput where no stretch is as long as the window."""
     c = channel.usable
-    t = (c.tai_ns - np.int64(grid.start_ns)) / NS
+    t = grid.of(c.tai_ns)
     at = grid.seconds
     derivatives = np.full((3, grid.count), np.nan)
     gain = np.full((grid.count, 3, 3), np.nan)

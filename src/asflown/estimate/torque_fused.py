@@ -23,13 +23,13 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from scipy import optimize
 
-from ..kit.errors import BadInput, some_of
+from ..kit.errors import BadInput
 from ..kit.regression import noise_sigma
 from ..kit.smoother import Measurements, Model, draw, log_likelihood, smooth
 from ..kit.timeline import NS
 from ..telemetry.channels import AXES
 from .latent_loop import MOMENTUM, RATE, SLOPE, TORQUE, Body, Levels, Series, Times, arrange
-from .subject import Grid, Subject, grid_for, slews
+from .subject import Grid, Subject, gaps_on_grid, grid_for, slews
 from .torque_momentum import actuators, gap_doubts, splined
 
 PRIORS = ("edges", "smooth")
@@ -60,7 +60,6 @@ class AxisFit:
     levels: Levels
     series: tuple[Series, ...]  # without outliers
     left_out: int
-    at_bound: tuple[str, ...]
     whiteness: dict[str, float]  # lag-one correlation of each channel's innovations
 
 
@@ -81,10 +80,10 @@ class Axis:
 def fused(subject: Subject, prior: str = "edges", axes: tuple[int, ...] = (0, 1, 2), seed: int = _SEED):
     """Returns grid, torque (M, 3), sigma, momentum, settings, doubts, paths (K, M, 3); NaN for axes not asked for.
 
+    ``prior``: one of PRIORS (``disturbance_torque`` checks it).
+
     Raises BadInput where attitude error, body rates, wheels, controller or inertia are missing, and in
     a slew (the loop's commanded motion is not in the telemetry)."""
-    if prior not in PRIORS:
-        raise BadInput(f"prior {prior!r} is not known", remedy=f"Choose one of: {some_of(PRIORS)}.")
     grid, series, start_Nms, doubts = _gather(subject, axes)
     I_B, controller = subject.known_inertia(), subject.controller()
     random = np.random.default_rng(seed).spawn(3)
@@ -134,14 +133,11 @@ def _solve_axis(body: Body, fit: AxisFit, grid: Grid, prior: str, rng: np.random
         paths = np.array([draw(model, data, rng)[:, TORQUE] for _ in range(PATHS)])
     paths = body.inertia_kgm2 * paths[:, wanted]
     best = smooth(model, data)
+    here = body.inertia_kgm2 * best.mean[wanted, TORQUE]
     if edges:
         mean, variance = paths.mean(axis=0), paths.var(axis=0, ddof=1)
     else:
-        mean, variance = (
-            body.inertia_kgm2 * best.mean[wanted, TORQUE],
-            body.inertia_kgm2**2 * best.covariance[wanted, TORQUE, TORQUE],
-        )
-    here = body.inertia_kgm2 * best.mean[wanted, TORQUE]
+        mean, variance = here, body.inertia_kgm2**2 * best.covariance[wanted, TORQUE, TORQUE]
     for name, share in CONSIDERED.items():
         other = replace(body, inertia_kgm2=body.inertia_kgm2 * (1 + share)) if name == "inertia" else body
         changed = replace(other.model(fit.levels, times, edges=edges), scale=model.scale)
@@ -233,15 +229,11 @@ def _gather(subject: Subject, axes):
         series[j] = []
         for row, c in enumerate((channels[k], channels[len(axes) + k])):
             u = c.usable
-            s = (u.tai_ns - np.int64(grid.start_ns)) / NS
+            s = grid.of(u.tai_ns)
             inside = (s >= 0) & (s <= grid.seconds[-1] + 1e-6)
             series[j].append(Series(row, s[inside], u.values[inside]))
         series[j].append(Series(2, t, h[:, j] - first[j]))
-    silent: dict[tuple[float, float], str] = {}
-    for c in [*channels, *[c for c, _ in stored]]:
-        u = c.usable
-        s = (u.tai_ns - np.int64(grid.start_ns)) / NS
-        silent |= {(s[a.stop - 1], s[b.start]): c.name for a, b in zip(u.segments(), u.segments()[1:], strict=False)}
+    silent = {g: c.name for c in everything for g in gaps_on_grid(c, grid)}
     doubts += [
         d.replace("are left null", "are bridged by the model, the band widened") for d in gap_doubts(tlm, grid, silent)
     ]
@@ -261,9 +253,9 @@ def _momentum(stored, grid: Grid, doubts: list[str]):
         for c, direction in stored:
             u = c.usable
             h += np.outer(u.values[np.searchsorted(u.tai_ns, common)], direction)
-        return (common - np.int64(grid.start_ns)) / NS, h
+        return grid.of(common), h
     doubts.append("the wheels are sampled at different instants: their rates are splined to those of the first")
-    times = (lead.tai_ns - np.int64(grid.start_ns)) / NS
+    times = grid.of(lead.tai_ns)
     times = times[(times >= 0) & (times <= grid.seconds[-1])]
     fine = Grid(grid.start_ns, 0.125, int(grid.seconds[-1] * 8) + 1)
     h = np.sum([np.outer(np.interp(times, fine.seconds, splined(c, fine)), d) for c, d in stored], axis=0)
@@ -313,16 +305,11 @@ def _fit_axis(body: Body, series: list[Series]) -> AxisFit:
         if not bad.any() or bad.mean() > 0.1:
             break
         series, left_out = _without(series, times, data, bad), int(bad.sum())
-    at_bound = tuple(
-        n
-        for n, p, (low, high) in zip(Levels.__dataclass_fields__, logs, bounds, strict=True)
-        if min(p - low, high - p) < 1e-3
-    )
     whiteness = {}
     for row, name in enumerate(("attitude_error", "body_rate", "momentum")):
         v = whitened[(data.row == row) & ~bad]
         whiteness[name] = float(np.corrcoef(v[:-1], v[1:])[0, 1]) if len(v) > 10 else 0.0
-    return AxisFit(Levels.from_logs(logs), tuple(series), left_out, at_bound, whiteness)
+    return AxisFit(Levels.from_logs(logs), tuple(series), left_out, whiteness)
 
 
 def _without(series, times: Times, data: Measurements, bad) -> list[Series]:

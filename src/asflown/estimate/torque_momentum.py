@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 from ..dynamics.momentum import wheel_momentum
 from ..kit.errors import BadInput
 from ..kit.regression import local_polynomial, loess
-from ..kit.timeline import NS
+from ..kit.timeline import NS, runs
 from ..telemetry.channels import AXES
 from ..telemetry.telemetry import Channel, Telemetry
 from .subject import Grid, Subject, fit_on_grid, gaps_on_grid, grid_for
@@ -70,24 +70,24 @@ def smoothed_as_printed(values: np.ndarray, share: float = PRINTED_SPAN) -> tupl
     span = printed_span(len(values), share)
     out = np.full_like(values, np.nan)
     known = np.isfinite(values).all(axis=1)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], known.astype(int), [0]])))
-    longest = max((b - a for a, b in zip(edges[::2], edges[1::2], strict=True)), default=0)
+    stretches = runs(known)
+    longest = max((s.stop - s.start for s in stretches), default=0)
     if span < 5 or longest < span:
         raise BadInput(
             f"{len(values)} s of record (longest stretch without a gap {longest} s) are too few for the printed method",
             remedy="It needs at least a minute without a gap: take a longer record.",
         )
-    for a, b in zip(edges[::2], edges[1::2], strict=True):
-        if b - a >= span:
+    for s in stretches:
+        if s.stop - s.start >= span:
             for k in range(values.shape[1]):
-                out[a:b, k] = loess(values[a:b, k], span)
+                out[s, k] = loess(values[s, k], span)
     return out, span
 
 
 def splined(channel: Channel, grid: Grid) -> np.ndarray:
     """Cubic spline onto the grid, stretch by stretch; NaN in gaps."""
     c = channel.usable
-    t, at = (c.tai_ns - np.int64(grid.start_ns)) / NS, grid.seconds
+    t, at = grid.of(c.tai_ns), grid.seconds
     out = np.full(grid.count, np.nan)
     for s in c.segments():
         inside = (at >= t[s][0] - 1e-9) & (at <= t[s][-1] + 1e-9)

@@ -85,13 +85,13 @@ def _momentum_samples(subject: Subject):
     ]
     grid = grid_for([c for c, _, _ in terms])
     lead = stored[0][0].usable
-    t = (lead.tai_ns - np.int64(grid.start_ns)) / NS
+    t = grid.of(lead.tai_ns)
     inside = (t >= 0) & (t <= grid.seconds[-1] + 1e-9)
     t = t[inside]
     H = np.zeros((len(t), 3))
     for channel, direction, width in terms:
         c = channel.usable
-        tc = (c.tai_ns - np.int64(grid.start_ns)) / NS
+        tc = grid.of(c.tai_ns)
         same = len(tc) >= len(t) and np.isin(np.round(t * 1e6), np.round(tc * 1e6)).all()
         if same:
             values = c.values[np.searchsorted(tc, t - 1e-6)]
@@ -126,12 +126,12 @@ def _from_error(subject: Subject, errors: dict[int, str], model: str):
     at, how = grid.seconds, "derivative of the polynomial"
     for j, name in errors.items():
         c = tlm.channel(name).usable
-        p, _, _ = _fit((c.tai_ns - np.int64(grid.start_ns)) / NS, c.values, 6)
+        p, _, _ = _fit(grid.of(c.tai_ns), c.values, 6)
         e, rate, acceleration = p(at), p.deriv()(at), p.deriv(2)(at)
         rate_name = f"controller_rate_error_{AXES[j]}"
         if rate_name in tlm:  # eq 8 accepts only this one: it holds KP e, to be taken off
             r = tlm.channel(rate_name).usable
-            q, _, _ = _fit((r.tai_ns - np.int64(grid.start_ns)) / NS, r.values, 6)
+            q, _, _ = _fit(grid.of(r.tai_ns), r.values, 6)
             rate, how = q(at) - k.kp_per_s * e, "controller_rate_error less KP e"
         torque[:, j] = (
             -inertia[j, j] / inverse.gain

@@ -22,7 +22,7 @@ from ..craft.model import WheelController
 from ..dynamics.loop import SecondOrder, filtered_rate, hankel_order_two, low_order
 from ..kit.errors import BadInput, some_of
 from ..kit.regression import LocalFit, local_polynomial
-from ..kit.timeline import NS
+from ..kit.timeline import NS, runs
 from ..telemetry.channels import AXES
 from .subject import Grid, Subject, fit_on_grid, gaps_on_grid, grid_for
 from .torque_momentum import HALF_WIDTH_S, gap_doubts, smoothed_as_printed, splined
@@ -128,10 +128,9 @@ class _Inverse:
         """e'', the rest of the bracket, and e'; NaN where e is."""
         out = np.full((3, len(e)), np.nan)
         known = np.isfinite(e) & (True if told is None else np.isfinite(told))
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], known.astype(int), [0]])))
-        for a, b in zip(edges[::2], edges[1::2], strict=True):
-            if b - a >= 8 * self.stride:
-                out[:, a:b] = self._stretch(e[a:b], None if told is None else told[a:b])
+        for s in runs(known):
+            if s.stop - s.start >= 8 * self.stride:
+                out[:, s] = self._stretch(e[s], None if told is None else told[s])
         return out
 
     def _stretch(self, e, told):

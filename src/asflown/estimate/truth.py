@@ -51,6 +51,6 @@ def against_truth(result: TorqueResult, time_s, torque_Nm, peaks, axis: str) -> 
         result.variant,
         tuple(100 * (v / p - 1) for (_, v), (_, p) in zip(found, peaks, strict=True)),
         lag,
-        float(np.mean([t - tp for (t, _), tp in zip(found, times, strict=True)])),
+        float(np.mean([t - tp for (t, _), tp in zip(found, times, strict=True)])) if times else float("nan"),
         float(np.sqrt(np.nanmean((estimate - true) ** 2))),
     )

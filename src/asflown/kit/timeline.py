@@ -131,6 +131,12 @@ def cadence_ns(tai_ns: np.ndarray) -> int:
     return int(np.median(np.diff(tai_ns)))
 
 
+def runs(known: np.ndarray) -> list[slice]:
+    """Stretches over which ``known`` (bool) holds."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(known).astype(int), [0]])))
+    return [slice(a, b) for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)]
+
+
 def segments(tai_ns: np.ndarray, missing_bridged: int, cadence: int) -> list[slice]:
     """Stretches without a gap: at most ``missing_bridged`` samples in a row are missing inside one."""
     if len(tai_ns) == 0:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 import platform
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
-from ..kit.errors import BadInput
+from ..kit.files import write_text
 from ..kit.timeline import utc_label
 from ..telemetry.channels import AXES
 from ..telemetry.tables import write_table
@@ -22,27 +21,10 @@ def write_flight(flight, directory: str | Path) -> dict[str, Path]:
     Each file appears whole or not at all.  Raises BadInput where the directory cannot be written."""
     folder = Path(directory)
     files = {"telemetry": folder / "telemetry.csv", "truth": folder / "truth.csv", "truth_json": folder / "truth.json"}
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        write_table(flight.telemetry, files["telemetry"])
-        _whole(files["truth"], truth_table(flight))
-        _whole(files["truth_json"], json.dumps(truth_record(flight), indent=1, allow_nan=False) + "\n")
-    except OSError as why:
-        raise BadInput(
-            f"the flight cannot be written there ({why.strerror or why})",
-            file=folder,
-            remedy="Give a directory that can be made and written.",
-        ) from why
+    write_text(files["truth"], truth_table(flight))  # makes the directory
+    write_table(flight.telemetry, files["telemetry"])
+    write_text(files["truth_json"], json.dumps(truth_record(flight), indent=1, allow_nan=False) + "\n")
     return files
-
-
-def _whole(path: Path, text: str) -> None:
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def truth_table(flight) -> str:

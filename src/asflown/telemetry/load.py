@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..kit.errors import BadInput, some_of
+from ..kit.files import sha256_of
 from ..kit.timeline import utc_to_tai_ns
 from .channels import kind_of, split_header, to_si
 from .tables import (
@@ -62,7 +62,7 @@ def load_telemetry(path, *, channels=None, exclude=None, craft=None) -> Telemetr
             epoch_ns=read.epoch_ns,
             dated=read.dated,
             source=str(path),
-            sha256=hashlib.sha256(data).hexdigest(),
+            sha256=sha256_of(data),
             time_labels=read.time_labels,
             label_tai_ns=read.label_tai_ns,
             findings=tuple(read.findings),

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import gzip
-import os
 import re
 import zlib
 from collections import Counter
@@ -21,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..kit.errors import BadInput, some_of
+from ..kit.files import write_whole
 from ..kit.quantities import si_factor
 from ..kit.timeline import NS, et_to_tai_ns, gps_to_tai_ns, utc_label, utc_to_tai_ns
 from .channels import split_header
@@ -420,19 +420,17 @@ def write_table(telemetry: Telemetry, path: str | Path) -> None:
         state = c.kind.behaves == "state"
         cells = [str(v) for v in c.values.tolist()] if state else [repr(float(v)) for v in c.values.tolist()]
         columns[f"{name} [{c.kind.unit}]"] = _spread(instants, c.tai_ns, cells)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
+    epoch = _epoch_text(telemetry)
+
+    def write(place: Path) -> None:
         if path.suffix == ".parquet":
-            _write_parquet(columns, _epoch_text(telemetry), temporary)
+            _write_parquet(columns, epoch, place)
         else:
-            _write_csv(columns, _epoch_text(telemetry), temporary, packed=path.suffix == ".gz")
-        os.replace(temporary, path)
-    except OSError as why:
-        raise BadInput(
-            f"the table cannot be written ({why.strerror or why})", file=path, remedy="Give another place."
-        ) from None
-    finally:
-        temporary.unlink(missing_ok=True)
+            _write_csv(columns, epoch, place, packed=path.suffix == ".gz")
+
+    if not path.parent.is_dir():
+        raise BadInput("the table cannot be written (no such folder)", file=path, remedy="Give another place.")
+    write_whole(path, write)
 
 
 def _epoch_text(telemetry: Telemetry) -> str | None:
