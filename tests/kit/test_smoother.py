@@ -1,9 +1,11 @@
-"""The smoother against batch least squares: same means, covariances, likelihood, and drives."""
+"""The smoother against batch least squares, and with gains that repeat against the full recursions."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from asflown.kit.smoother import Measurements, Model, discretize, draw, log_likelihood, smooth
+from asflown.kit.smoother import Measurements, Model, discretize, forward, log_likelihood, smooth
 
 
 def problem(seed, n=4, steps=25, drives=1):
@@ -76,24 +78,75 @@ def test_law_a_gap_widens_the_band():
     assert np.all(s.covariance[20].diagonal() > whole.covariance[20].diagonal())
 
 
-def test_law_expected_drive_averages_to_one_for_data_from_the_model():
-    """E[w^2]/q over noise drawn from the prior is 1: the fixed point of a scale update."""
+def regular(steps=2400, lost=()):
+    """A loop of one body: position every step, rate every second, momentum every fourth; 300 steps dark."""
+    rng = np.random.default_rng(7)
+    F = np.array([[0.0, 1, 0, 0], [-0.04, -0.3, 0, 1], [0.04, 0.3, 0, 0], [0, 0, 0, -0.05]])
+    A, Q = discretize(F, np.diag([0, 1e-4, 1e-4, 1e-2]), [0.5, 1.0])
+    start, row = [0], []
+    for k in range(steps):
+        dark = 900 <= k < 1200
+        row += [r for r, every in enumerate((1, 2, 4)) if k % every == 0 and not dark and (k, r) not in lost]
+        start.append(len(row))
+    H = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 2, 0]])
+    driven = np.zeros((1, 2, 4, 4))
+    driven[0, :, 3, 3] = 0.01
+    row, R = np.array(row), np.array([1e-2, 1e-3, 1e-2])
+    which = (np.arange(steps) % 4 == 3).astype(int)
+    model = Model(A, Q, driven, np.ones((steps, 1)), which, H, R, np.zeros(4), np.diag([1.0, 1, 100, 1]))
+    return model, Measurements(np.array(start), row, np.sqrt(R[row]) * rng.normal(size=len(row)))
+
+
+def without_repeats(model):
+    """The same model, every step of a kind of its own: no gains can be reused."""
+    kinds = model.which
+    return replace(
+        model, A=model.A[kinds], Q=model.Q[kinds], driven=model.driven[:, kinds], which=np.arange(len(kinds))
+    )
+
+
+@pytest.mark.parametrize("lost", [(), ((1500, 0), (1501, 0), (1600, 2)), ((2398, 1), (3, 0))])
+def test_law_repeated_gains_equal_the_full_recursions(lost):
+    model, data = regular(lost=lost)
+    fast, full = smooth(model, data), smooth(without_repeats(model), data)
+    assert len(np.unique(fast.case)) < 0.7 * len(fast.case) and len(np.unique(full.case)) == len(full.case)
+    assert log_likelihood(model, data) == pytest.approx(log_likelihood(without_repeats(model), data), rel=1e-10)
+    assert fast.log_likelihood == pytest.approx(full.log_likelihood, rel=1e-10)
+    sigma = np.sqrt(np.einsum("kii->ki", full.covariance))
+    assert np.abs((fast.mean - full.mean) / sigma).max() < 1e-9
+    assert np.abs((fast.covariance - full.covariance) / sigma[:, :, None] / sigma[:, None]).max() < 1e-9
+    assert np.abs(fast.whitened - full.whitened).max() < 1e-9
+    for a, b in zip(forward(model, data), forward(without_repeats(model), data), strict=True):
+        assert np.allclose(a, b, rtol=1e-9, atol=1e-9 * np.abs(b).max())
+
+
+def test_law_a_changed_scale_ends_the_repeats():
+    model, data = regular()
+    scale = model.scale.copy()
+    scale[500:600] = 9.0
+    changed = replace(model, scale=scale)
+    fast, full = smooth(changed, data), smooth(without_repeats(changed), data)
+    assert np.allclose(fast.covariance, full.covariance, rtol=1e-9, atol=1e-12)
+    assert np.allclose(fast.mean, full.mean, rtol=1e-9, atol=1e-10)
+    assert fast.covariance[550, 3, 3] > 1.5 * smooth(model, data).covariance[550, 3, 3]
+
+
+def test_law_innovations_of_data_from_the_model_are_white():
     rng = np.random.default_rng(0)
     n = 2
-    A, Q = discretize(np.array([[0.0, 1], [0, 0]]), np.zeros((n, n)), [1.0])
-    _, D = discretize(np.array([[0.0, 1], [0, 0]]), np.diag([0.0, 1.0]), [1.0])
+    A, Q = discretize(np.array([[0.0, 1], [0, 0]]), np.diag([0.0, 1.0]), [1.0])
     N = 3000
     x, y = np.zeros(n), []
-    L = np.linalg.cholesky(D[0])
+    L = np.linalg.cholesky(Q[0])
     for k in range(N):
         if k:
             x = A[0] @ x + L @ rng.normal(size=n)
         y.append(x[0] + 0.1 * rng.normal())
     model = Model(
-        A, Q, D[None], np.ones((N, 1)), np.zeros(N, int), np.array([[1.0, 0]]), np.array([0.01]), np.zeros(n), np.eye(n)
-    )
+        A, Q, np.zeros((0, 1, n, n)), np.ones((N, 0)), np.zeros(N, int), np.array([[1.0, 0]]), np.array([0.01]),
+        np.zeros(n), np.eye(n),
+    )  # fmt: skip
     s = smooth(model, Measurements(np.arange(N + 1), np.zeros(N, int), np.array(y)))
-    assert s.drive[1:].mean() == pytest.approx(1.0, abs=0.06)
     assert np.std(s.whitened) == pytest.approx(1.0, abs=0.05)
 
 
@@ -109,15 +162,3 @@ def test_law_discretization_is_exact():
         block = np.block([[-F, Qc], [np.zeros((6, 6)), F.T]]) * dt
         E = expm(block)
         assert np.allclose(a, E[6:, 6:].T, rtol=1e-9) and np.allclose(q, E[6:, 6:].T @ E[:6, 6:], rtol=1e-8)
-
-
-def test_law_draws_have_the_smoothed_mean_and_covariance():
-    model, data = problem(4, steps=12)
-    s, rng = smooth(model, data), np.random.default_rng(0)
-    paths = np.array([draw(model, data, rng) for _ in range(4000)])
-    sigma = np.sqrt(np.einsum("kii->ki", s.covariance))
-    assert np.abs((paths.mean(axis=0) - s.mean) / sigma).max() < 5 / np.sqrt(4000)
-    assert np.allclose(paths.std(axis=0) / sigma, 1, atol=0.06)
-    between = np.mean((paths[:, 3, 0] - s.mean[3, 0]) * (paths[:, 8, 1] - s.mean[8, 1]))  # and across time
-    _, covariance, _ = batch(model, data)
-    assert between == pytest.approx(covariance[3 * 4, 8 * 4 + 1], abs=5 * sigma[3, 0] * sigma[8, 1] / np.sqrt(4000))

@@ -1,9 +1,13 @@
 """Kalman filter and fixed-interval smoother for linear Gaussian models, samples at any times.
 
 Every scalar measurement is taken in at its own step, so channels may have any cadence and any sample
-may be missing.  Process noise has a fixed part and driven parts whose size may differ from step to step.  The backward pass is the modified Bryson-Frazier form: it inverts nothing, so a
-singular covariance (a state that is known, a deterministic part of the loop) does no harm.  Cost is
-linear in the number of steps.
+may be missing.  Process noise has a fixed part and driven parts whose size may differ from step to step.
+The backward pass is the modified Bryson-Frazier form: it inverts nothing, so a singular covariance (a
+state that is known, a deterministic part of the loop) does no harm.
+
+Covariances and gains do not depend on what was measured, only on when.  Where the steps repeat with a
+period, both passes settle into repeating theirs; from there on gains are reused and a step costs
+its means alone, until a gap or a missing sample breaks the pattern.  Cost is linear in the number of steps.
 """
 
 from __future__ import annotations
@@ -13,6 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from .compiled import jit
+
+#: Longest period of the steps that is looked for.  1 s beside 64 s is within it.
+_LONGEST_PERIOD = 64
+#: Two covariances are the same when no element differs by more, in units of both its sigmas.
+_SAME = 1e-12
 
 
 @dataclass(frozen=True)
@@ -75,73 +84,127 @@ def _discretize(F, Qc, steps):
     return A, Q
 
 
+def forward(model: Model, data: Measurements):
+    """The filter alone: log likelihood, means (N, n) and covariances (N, n, n) after each step's measurements, and
+    of each measurement its innovation, that one's variance, and P H^T (n,) before it."""
+    ll, means, covariances, innovation, variance, product, origin = _filter(*_arrays(model, data), True)
+    moved = np.repeat(data.start[origin] - data.start[:-1], np.diff(data.start))
+    return ll, means, covariances[origin], innovation, variance, product[np.arange(len(moved)) + moved]
+
+
 def log_likelihood(model: Model, data: Measurements) -> float:
-    """Of all measurements, by the innovations."""
+    """Of all measurements, by the innovations.  Memory does not grow with the record."""
     return float(_filter(*_arrays(model, data), False)[0])
 
 
 @dataclass(frozen=True)
 class Smoothed:
-    """Mean (N, n) and covariance (N, n, n) given all measurements; innovations over their sigma (M,).
+    """Mean (N, n) given all measurements; innovations over their sigma (M,).
 
-    ``drive``: (N, J), the expected square of each driven noise over its variance at scale 1, given all
-    measurements: what an update of ``scale`` needs."""
+    Covariances that repeat are held once: that of step k is ``matrices[case[k]]``."""
 
     mean: np.ndarray
-    covariance: np.ndarray
+    matrices: np.ndarray
+    case: np.ndarray
     whitened: np.ndarray
-    drive: np.ndarray
     log_likelihood: float
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Of every step, (N, n, n)."""
+        return self.matrices[self.case]
 
 
 def smooth(model: Model, data: Measurements) -> Smoothed:
-    """Fixed-interval smoothing."""
+    """Fixed-interval smoothing.
+
+    Memory written is n numbers a step and 2 a measurement, and n^2 a step and n a measurement more where the
+    full recursions run; where gains repeat these are only set aside, which costs address space alone."""
     arrays = _arrays(model, data)
-    ll, mean, covariance, innovation, variance, product = _filter(*arrays, True)
-    A, _, driven, scale, which, H, _, _, _, start, row, _ = arrays
-    drive = _backward(A, driven, scale, which, H, start, row, mean, covariance, innovation, variance, product)
+    ll, mean, covariances, innovation, variance, product, origin = _filter(*arrays, True)
+    A, _, _, _, which, H, _, _, _, start, row, _, period, _ = arrays
+    case = _backward(A, which, H, start, row, period, mean, covariances, innovation, variance, product, origin)
     # a variance that rounding drove below zero (values of absurd size) shows as NaN, without noise
     whitened = innovation / np.sqrt(np.where(variance > 0, variance, np.nan))
-    return Smoothed(mean, covariance, whitened, drive, float(ll))
-
-
-def draw(model: Model, data: Measurements, rng: np.random.Generator) -> np.ndarray:
-    """One path of the states (N, n) from their joint distribution given all measurements.
-
-    A path and its measurements are simulated, and the smoothed difference between the true and the
-    simulated measurements is added to it (Durbin and Koopman's simulation smoother)."""
-    steps, n = len(model.which), len(model.mean)
-    noise = np.einsum("krc,kc->kr", _roots(model.Q)[model.which], rng.standard_normal((steps, n)))
-    for j, D in enumerate(model.driven):
-        part = np.einsum("krc,kc->kr", _roots(D)[model.which], rng.standard_normal((steps, n)))
-        noise += np.sqrt(model.scale[:, j, None]) * part
-    noise[0] = model.mean + _roots(model.covariance[None])[0] @ rng.standard_normal(n)
-    reading = np.sqrt(model.R[data.row]) * rng.standard_normal(len(data.row))
-    A, Q, driven, scale, which, H, R, mean, covariance, start, row, value = _arrays(model, data)
-    path, simulated = _simulate(A, which, H, start, row, noise, reading)
-    kept = _filter(A, Q, driven, scale, which, H, R, 0 * mean, covariance, start, row, value - simulated, True)
-    return path + _backward_mean(A, which, H, start, row, *kept[1:])
-
-
-def _roots(Q: np.ndarray) -> np.ndarray:
-    """Matrices B with B B^T = Q, also for singular Q."""
-    w, V = np.linalg.eigh(Q)
-    return V * np.sqrt(np.maximum(w, 0.0))[:, None, :]
+    return Smoothed(mean, covariances, case, whitened, float(ll))
 
 
 def _arrays(model: Model, data: Measurements):
+    which, start, row = (np.ascontiguousarray(x, dtype=np.int64) for x in (model.which, data.start, data.row))
     return (
         np.ascontiguousarray(model.A), np.ascontiguousarray(model.Q), np.ascontiguousarray(model.driven),
-        np.ascontiguousarray(model.scale, dtype=float), model.which.astype(np.int64),
+        np.ascontiguousarray(model.scale, dtype=float), which,
         np.ascontiguousarray(model.H), np.ascontiguousarray(model.R, dtype=float),
         np.ascontiguousarray(model.mean, dtype=float), np.ascontiguousarray(model.covariance, dtype=float),
-        data.start.astype(np.int64), data.row.astype(np.int64), np.ascontiguousarray(data.value, dtype=float),
+        start, row, np.ascontiguousarray(data.value, dtype=float), _period(which, start, row),
+        int(np.max(np.diff(start), initial=0)),
     )  # fmt: skip
 
 
 @jit
+def _period(which, start, row):
+    """The period with which most steps repeat, 0 where none does."""
+    steps = len(which)
+    kind = which.copy()  # a number for what happens at each step; a rare clash costs only a worse period
+    for k in range(steps):
+        for i in range(start[k], start[k + 1]):
+            kind[k] = 31 * kind[k] + row[i] + 1
+    best, most = 0, 0
+    for p in range(1, min(_LONGEST_PERIOD, steps - 1) + 1):
+        count = 0
+        for k in range(p, steps):
+            count += kind[k] == kind[k - p]
+        if count > most:
+            best, most = p, count
+    return best
+
+
+@jit
+def _same_step(k, other, which, scale, start, row):
+    """Whether two steps do the same to a covariance."""
+    if which[k] != which[other] or start[k + 1] - start[k] != start[other + 1] - start[other]:
+        return False
+    for i in range(start[k + 1] - start[k]):
+        if row[start[k] + i] != row[start[other] + i]:
+            return False
+    same = True
+    for j in range(scale.shape[1]):
+        same &= scale[k, j] == scale[other, j]
+    return same
+
+
+@jit
+def _same_matrix(P, other):
+    for r in range(len(P)):
+        for c in range(r, -1, -1):
+            if not abs(P[r, c] - other[r, c]) <= _SAME * np.sqrt(P[r, r] * P[c, c]):  # NaN is never the same
+                return False
+    return True
+
+
+@jit
+def _apply(a, x, work):
+    """x = a x, in place."""
+    for r in range(len(x)):
+        work[r] = x[r]
+    for r in range(len(x)):
+        t = 0.0
+        for c in range(len(x)):
+            t += a[r, c] * work[c]
+        x[r] = t
+
+
+@jit
+def _add(P, factor, other):
+    """P += factor other, without a temporary."""
+    for r in range(len(P)):
+        for c in range(len(P)):
+            P[r, c] += factor * other[r, c]
+
+
+@jit
 def _sandwich(a, P, out, work):
-    """out = a P a^T by plain loops: at these sizes a library call costs more than the sums."""
+    """out = a P a^T, exactly symmetric, by plain loops: at these sizes a library call costs as much."""
     n = len(a)
     for r in range(n):
         for c in range(n):
@@ -161,118 +224,147 @@ def _sandwich(a, P, out, work):
 
 
 @jit
-def _filter(A, Q, driven, scale, which, H, R, m0, P0, start, row, value, keep):
+def _filter(A, Q, driven, scale, which, H, R, m0, P0, start, row, value, period, most, keep):
+    """Log likelihood and, if ``keep``, all of it; ``origin``: the step whose covariances and gains each step has.
+
+    Covariances and products are filled in at their origins only."""
     n, steps, count = len(m0), len(which), len(value)
-    size = steps if keep else 1
-    means, covariances = np.zeros((size, n)), np.zeros((size, n, n))
-    stored = count if keep else 1
-    innovation, variance, product = np.zeros(stored), np.ones(stored), np.zeros((stored, n))
-    m, P, predicted, work, Ph = m0.copy(), P0.copy(), np.empty((n, n)), np.empty((n, n)), np.empty(n)
-    ll = 0.0
+    size, stored = (steps, count) if keep else (1, 1)
+    means, covariances, origin = np.empty((size, n)), np.empty((size, n, n)), np.empty(size, np.int64)
+    innovation, variance, product = np.empty(stored), np.empty(stored), np.empty((stored, n))
+    # of the last period's steps: covariance, P H^T and the innovations' variances
+    phases = max(period, 1)
+    past, Ph, S = np.zeros((phases, n, n)), np.zeros((phases, most, n)), np.ones((phases, most))
+    m, P, moved, work, line = m0.copy(), P0.copy(), np.empty((n, n)), np.empty((n, n)), np.empty(n)
+    ll, settled, again = 0.0, False, False  # settled: the covariance is that of one period ago
     for k in range(steps):
+        phase = k % phases
+        was, again = again, settled and _same_step(k, k - period, which, scale, start, row)
         if k > 0:
-            c0 = which[k]
-            m = A[c0] @ m
-            _sandwich(A[c0], P, predicted, work)
-            P, predicted = predicted, P
-            P += Q[c0]
-            for j in range(len(driven)):
-                P += scale[k, j] * driven[j, c0]
+            a = A[which[k]]
+            _apply(a, m, line)
+            if not again:
+                if was:
+                    P[:] = past[(k - 1) % phases]
+                _sandwich(a, P, moved, work)
+                P, moved = moved, P
+                _add(P, 1.0, Q[which[k]])
+                for j in range(len(driven)):
+                    _add(P, scale[k, j], driven[j, which[k]])
         for i in range(start[k], start[k + 1]):
-            h = H[row[i]]
-            S, v = R[row[i]], value[i]
+            j, h = i - start[k], row[i]
+            if not again:
+                S[phase, j] = _take_in(P, H[h], R[h], Ph[phase, j])
+            v = value[i]
             for r in range(n):
-                t = 0.0
-                for c in range(n):
-                    if h[c] != 0.0:
-                        t += P[r, c] * h[c]
-                Ph[r] = t
-                S += h[r] * t
-                v -= h[r] * m[r]
-            ll -= 0.5 * (np.log(2 * np.pi * S) + v * v / S)
+                v -= H[h, r] * m[r]
+            u = v / S[phase, j]
             for r in range(n):
-                gain = Ph[r] / S
-                m[r] += gain * v
-                for c in range(n):
-                    P[r, c] -= gain * Ph[c]
+                m[r] += Ph[phase, j, r] * u
+            ll -= 0.5 * (np.log(2 * np.pi * S[phase, j]) + v * u)
             if keep:
-                innovation[i], variance[i] = v, S
-                product[i] = Ph
+                innovation[i], variance[i] = v, S[phase, j]
+                if not again:
+                    product[i] = Ph[phase, j]
+        if not again:
+            settled = 0 < period <= k and _same_matrix(P, past[phase])
+            past[phase] = P
         if keep:
             means[k] = m
-            covariances[k] = 0.5 * (P + P.T)
-    return ll, means, covariances, innovation, variance, product
+            origin[k] = origin[k - period] if again else k
+            if not again:
+                covariances[k] = P
+    return ll, means, covariances, innovation, variance, product, origin
 
 
 @jit
-def _backward(A, driven, scale, which, H, start, row, mean, covariance, innovation, variance, product):
-    """Turn filtered means and covariances into smoothed ones, in place; return the expected squared drives."""
+def _take_in(P, h, noise, Ph):
+    """Covariance after one measurement and, before it, P h^T, in place; returns the innovation's variance."""
+    n, S = len(P), noise
+    for c in range(n):
+        Ph[c] = 0.0
+    for r in range(n):
+        if h[r] != 0.0:
+            for c in range(n):
+                Ph[c] += h[r] * P[r, c]
+    for r in range(n):
+        S += h[r] * Ph[r]
+    part = 1 / S
+    for r in range(n):
+        for c in range(n):
+            P[r, c] -= Ph[r] * Ph[c] * part  # exactly symmetric
+    return S
+
+
+@jit
+def _backward(A, which, H, start, row, period, mean, covariances, innovation, variance, product, origin):
+    """Smooth the filtered means in place; lay smoothed covariances beside or over the filtered ones.
+
+    Returns where that of each step lies.  A step that repeats another's has its own place free, and no step
+    reads the place of a later one that did not."""
     steps, n = mean.shape
-    drive = np.ones((steps, len(driven)))
-    adjoint, information, turned, work = np.zeros(n), np.zeros((n, n)), np.empty((n, n)), np.empty((n, n))
+    case, phases = np.empty(steps, np.int64), max(period, 1)
+    past = np.zeros((phases, n, n))  # information from beyond each of the next period's steps
+    adjoint, line, N = np.zeros(n), np.empty(n), np.zeros((n, n))
+    turned, work, back = np.empty((n, n)), np.empty((n, n)), np.empty(A.shape)
+    for c in range(len(A)):
+        back[c] = A[c].T
+    settled, again = False, False  # settled: the information from beyond is that of one period on
     for k in range(steps - 1, -1, -1):
-        P = covariance[k].copy()
-        mean[k] = mean[k] - P @ adjoint
-        _sandwich(P, information, turned, work)  # P is symmetric
-        covariance[k] = P - turned
-        for i in range(start[k + 1] - 1, start[k] - 1, -1):
-            h = H[row[i]]
-            S = variance[i]
-            K = product[i] / S
-            adjoint = adjoint - h * (innovation[i] / S + K @ adjoint)
-            Kinformation = K @ information
-            both = K @ Kinformation + 1 / S
+        was, again = again, settled and origin[k + period] == origin[k]
+        P = covariances[origin[k]]
+        for r in range(n):
+            t = 0.0
+            for c in range(n):
+                t += P[r, c] * adjoint[c]
+            mean[k, r] -= t
+        if again:
+            case[k] = case[k + period]
+        else:
+            case[k] = k
+            if was:
+                N[:] = past[k % phases]
+            past[k % phases] = N
+            _sandwich(P, N, turned, work)  # P is symmetric
             for r in range(n):
                 for c in range(n):
-                    information[r, c] += h[r] * h[c] * both - h[r] * Kinformation[c] - Kinformation[r] * h[c]
-        if k > 0:
-            for j in range(len(driven)):
-                # seen at the state the noise enters most: the last one it moves (the torque's slope)
-                D = driven[j, which[k]]
-                top = 0
-                for r in range(n):
-                    if D[r, r] > 0:
-                        top = r
-                q = np.ascontiguousarray(D[top]) * scale[k, j]
-                w = -(q @ adjoint)
-                left = q[top] - q @ information @ q
-                drive[k, j] = (w * w + left) / D[top, top]
-            back = A[which[k]].T.copy()
-            adjoint = back @ adjoint
-            _sandwich(back, information, turned, work)
-            information, turned = turned, information
-    return drive
-
-
-@jit
-def _simulate(A, which, H, start, row, noise, reading):
-    """A path driven by ``noise`` (N, n; its first row is the start) and its measurements."""
-    path = noise.copy()
-    simulated = reading.copy()
-    for k in range(len(which)):
-        if k > 0:
-            path[k] += A[which[k]] @ path[k - 1]
-        for i in range(start[k], start[k + 1]):
-            simulated[i] += H[row[i]] @ path[k]
-    return path, simulated
-
-
-@jit
-def _backward_mean(A, which, H, start, row, mean, covariance, innovation, variance, product):
-    """Smoothed means alone."""
-    steps, n = mean.shape
-    out = mean.copy()
-    adjoint = np.zeros(n)
-    for k in range(steps - 1, -1, -1):
-        out[k] = mean[k] - covariance[k] @ adjoint
+                    covariances[k, r, c] = P[r, c] - turned[r, c]
         for i in range(start[k + 1] - 1, start[k] - 1, -1):
-            S = variance[i]
-            dot = 0.0
+            own, h = start[origin[k]] + i - start[k], row[i]
+            u = innovation[i]
             for r in range(n):
-                dot += product[i, r] * adjoint[r]
-            gain = (innovation[i] + dot) / S
+                u += product[own, r] * adjoint[r]
+            u /= variance[i]
             for r in range(n):
-                adjoint[r] -= H[row[i], r] * gain
+                adjoint[r] -= H[h, r] * u
+            if not again:
+                _give_back(N, H[h], product[own], variance[i], line)
         if k > 0:
-            adjoint = A[which[k]].T.copy() @ adjoint
-    return out
+            _apply(back[which[k]], adjoint, line)
+            if not again:
+                _sandwich(back[which[k]], N, turned, work)
+                N, turned = turned, N
+                settled = 0 < period <= steps - k and _same_matrix(N, past[(k - 1) % phases])
+    return case
+
+
+@jit
+def _give_back(N, h, Ph, S, KN):
+    """N = (1 - K h)^T N (1 - K h) + h^T h / S in place, with K = P h^T / S."""
+    n = len(N)
+    for c in range(n):
+        KN[c] = 0.0
+    for r in range(n):
+        gain = Ph[r] / S
+        for c in range(n):
+            KN[c] += gain * N[r, c]
+    half = 1.0
+    for r in range(n):
+        half += KN[r] * Ph[r]
+    half /= 2 * S
+    for r in range(n):
+        if h[r] != 0.0:
+            for c in range(n):
+                change = h[r] * (h[c] * half - KN[c])
+                N[r, c] += change
+                N[c, r] += change
