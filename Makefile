@@ -27,7 +27,7 @@ slow: setup                ## the campaigns that .ci/run adds
 	$(BIN)/python -m pytest -m slow
 
 bench: setup               ## timings beside the peers, as ratios
-	for b in benchmarks/bench_*.py; do $(BIN)/python $$b || exit 1; done
+	$(BIN)/python benchmarks/torque_speed.py
 
 check: setup               ## style and types
 	$(BIN)/ruff check src tests studies benchmarks

@@ -241,7 +241,8 @@ def fit_on_grid(channel: Channel, grid: Grid, *, degree: int, half_width_s: floa
     sigma = max(sigma, channel.count_size / np.sqrt(12)) if np.isfinite(sigma) else sigma
     edges = [t[0], *[v for s in held for v in (t[s][0], t[s][-1])], t[-1]]
     gaps = tuple((a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b > a)
-    return SampledFit(LocalFit(derivatives, gain, width, own), sigma, widened + shortfall * sigma**2, gaps)
+    fit = LocalFit(derivatives, np.arange(grid.count), gain, width, own)
+    return SampledFit(fit, sigma, widened + shortfall * sigma**2, gaps)
 
 
 def _cost_of_widening(t, y, at, part: LocalFit, degree: int, half_width_s: float) -> tuple[np.ndarray, np.ndarray]:

@@ -27,14 +27,14 @@ _MOST_PHASES = 64  # distinct offsets of the wanted instants within one sample s
 class LocalFit:
     """Local fits at M instants.
 
-    ``derivatives``: (3, M), value, slope and curvature; ``gain``: (M, 3, 3), their covariance per
-    unit variance of independent noise on the samples; ``half_width``: (M,), the windows used;
-    ``own``: (M,), the weight in the value of a sample at that very instant (0 where there is none)."""
+    ``derivatives``: (3, M), value, slope and curvature.  What a window alone decides is held once for all
+    instants that share one: that of instant m is number ``window[m]`` of ``gains``, ``widths`` and ``owns``."""
 
     derivatives: np.ndarray
-    gain: np.ndarray
-    half_width: np.ndarray
-    own: np.ndarray
+    window: np.ndarray  # (M,) int
+    gains: np.ndarray  # (W, 3, 3)
+    widths: np.ndarray  # (W,)
+    owns: np.ndarray  # (W,)
 
     @property
     def value(self) -> np.ndarray:
@@ -48,10 +48,25 @@ class LocalFit:
     def curvature(self) -> np.ndarray:
         return self.derivatives[2]
 
+    @property
+    def gain(self) -> np.ndarray:
+        """Covariance of the three per unit variance of independent noise on the samples, (M, 3, 3)."""
+        return self.gains[self.window]
+
+    @property
+    def half_width(self) -> np.ndarray:
+        """Of the windows used, (M,)."""
+        return self.widths[self.window]
+
+    @property
+    def own(self) -> np.ndarray:
+        """The weight in the value of a sample at that very instant, 0 where there is none, (M,)."""
+        return self.owns[self.window]
+
     def variance(self, weights) -> np.ndarray:
         """Variance, per unit noise variance, of w0 value + w1 slope + w2 curvature.  (M,)"""
         w = np.asarray(weights, float)
-        return np.einsum("i,mij,j->m", w, self.gain, w)
+        return np.einsum("i,wij,j->w", w, self.gains, w)[self.window]
 
 
 def local_polynomial(
@@ -77,18 +92,35 @@ def local_polynomial(
         )
     neighbors = min(neighbors, len(t))
     order = min(degree, 2) + 1
-    derivatives = np.zeros((3, len(at)))
-    gain = np.zeros((len(at), 3, 3))
-    rest = np.ones(len(at), bool)
+    fit = _Fit(np.zeros((3, len(at))), np.full(len(at), -1, np.int32), [])
     reach = half_width if half_width is not None else (neighbors - 1) / 2 * (step or 0.0)
-    fit = LocalFit(derivatives, gain, np.full(len(at), reach), np.zeros(len(at)))
     if step and (half_width is not None or neighbors % 2) and len(t) > neighbors:
-        rest &= ~_complete_windows(t, y, at, step, reach, degree, order, fit)
-    todo = np.flatnonzero(rest)
+        _complete_windows(t, y, at, step, reach, degree, order, fit)
+    todo = np.flatnonzero(fit.window < 0)
     for part in np.array_split(todo, len(todo) * (neighbors + 4) // 5_000_000 + 1):
         if len(part):
             _direct(t, y, at, part, degree, order, neighbors, half_width, fit)
-    return fit
+    return fit.done()
+
+
+@dataclass
+class _Fit:
+    """A LocalFit in the making; window -1 is not done yet."""
+
+    derivatives: np.ndarray
+    window: np.ndarray
+    windows: list  # of gains, widths, owns
+
+    def add(self, where, gains, widths, owns) -> None:
+        """One window for all of ``where``, or one for each."""
+        used = sum(len(w[1]) for w in self.windows)
+        self.window[where] = used if len(widths) == 1 else np.arange(used, used + len(widths))
+        self.windows.append((gains, widths, owns))
+
+    def done(self) -> LocalFit:
+        empty = np.zeros((0, 3, 3)), np.zeros(0), np.zeros(0)
+        gains, widths, owns = (np.concatenate(parts) for parts in zip(empty, *self.windows, strict=True))
+        return LocalFit(self.derivatives, self.window, gains, widths, owns)
 
 
 def loess(y, span: int, degree: int = 2) -> np.ndarray:
@@ -103,7 +135,7 @@ def noise_sigma(t, y, *, degree: int, half_width: float) -> float:
     Robust: a median, so that a few corners of the signal do not count as noise."""
     t, y = np.asarray(t, float), np.asarray(y, float)
     fit = local_polynomial(t, y, t, degree=degree, half_width=half_width)
-    left = 1 - 2 * fit.own + fit.gain[:, 0, 0]  # expected squared residual per unit noise variance
+    left = (1 - 2 * fit.owns + fit.gains[:, 0, 0])[fit.window]  # expected squared residual per unit noise variance
     usable = left > 0.02
     if usable.sum() < 4:
         return float("nan")
@@ -120,8 +152,16 @@ def _lattice_step(t: np.ndarray) -> float | None:
     if count < 1 or count > 4 * len(t):
         return None
     step = (t[-1] - t[0]) / count
-    place = (t - t[0]) / step
-    return step if np.all(np.abs(place - np.round(place)) < 1e-6) else None
+    return step if _on_lattice(t, step) else None
+
+
+@jit
+def _on_lattice(t, step):
+    worst = 0.0
+    for i in range(len(t)):
+        place = (t[i] - t[0]) / step
+        worst = max(worst, abs(place - np.floor(place + 0.5)))
+    return worst < 1e-6
 
 
 def _tricube(u: np.ndarray) -> np.ndarray:
@@ -143,42 +183,110 @@ def _rows(offset, bandwidth, degree, order):
     return rows * scale[..., None]
 
 
-def _complete_windows(t, y, at, step, reach, degree, order, fit) -> np.ndarray:
-    """Fill the instants whose window misses no sample, by one correlation a phase; returns which they are."""
-    place = np.round((t - t[0]) / step).astype(int)
-    lattice = np.zeros(place[-1] + 1)
-    lattice[place] = y
-    missing = np.ones(len(lattice))
-    missing[place] = 0
-    missing = np.concatenate([[0], np.cumsum(missing)])
-    inside = (at >= t[0] + reach * (1 - 1e-12)) & (at <= t[-1] - reach * (1 - 1e-12))
-    base = np.floor((at - t[0]) / step + 1e-7).astype(int)
-    phase = np.round(np.clip((at - t[0]) / step - base, 0, 1), 6)
-    phases = np.unique(phase[inside])
-    filled = np.zeros(len(at), bool)
+def _complete_windows(t, y, at, step, reach, degree, order, fit) -> None:
+    """Fill the instants whose window misses no sample, by one correlation a phase."""
+    lattice, missing = _lay(t, y, step)
+    base, which, phases = _places(at, t[0], t[-1], step, reach * (1 - 1e-12))
     if len(phases) > _MOST_PHASES:
-        return filled
+        return
     n = int(np.floor(reach / step + 1e-9))
-    for f in phases:
+    for number, f in enumerate(phases):
         k = np.arange(-n - 1, n + 3)
         k = k[np.abs(k - f) * step < reach * (1 - 1e-12)]
         offset = (k - f) * step
-        here = np.flatnonzero(inside & (phase == f))
         # a sample at the very edge weighs nothing, but would be counted as a neighbour: it must be there too
         before, after = int(np.ceil(f - reach / step - 1e-9)), int(np.floor(f + reach / step + 1e-9))
-        low, high = base[here] + before, base[here] + after + 1
-        good = (low >= 0) & (high <= len(lattice))
-        good[good] = missing[high[good]] == missing[low[good]]
-        here, low = here[good], (base[here] + k[0])[good]
+        here, even = _complete(base, which, number, before, after, missing)
         if len(k) < degree + 1 or not len(here):
             continue
-        rows = _rows(offset[None], reach, degree, order)[0]
-        for o in range(order):
-            fit.derivatives[o, here] = np.correlate(lattice, rows[o], "valid")[low]
-        fit.gain[np.ix_(here, range(order), range(order))] = rows @ rows.T
-        fit.own[here] = rows[0] @ (offset == 0)
-        filled[here] = True
-    return filled
+        rows = np.zeros((3, len(k)))
+        rows[:order] = _rows(offset[None], reach, degree, order)[0]
+        if even:  # straight into place
+            here = slice(here[0], here[-1] + 1)
+            _correlate(lattice[base[here.start] + k[0] :], rows, fit.derivatives[:, here])
+        else:
+            everywhere = np.empty((3, len(lattice) - len(k) + 1))
+            _correlate(lattice, rows, everywhere)
+            fit.derivatives[:, here] = everywhere[:, base[here] + k[0]]
+        fit.add(here, (rows @ rows.T)[None], np.array([reach]), np.array([rows[0] @ (offset == 0)]))
+
+
+@jit
+def _lay(t, y, step):
+    """Samples on their lattice, zero where one is missing, and how many are missing before each place."""
+    count = int((t[-1] - t[0]) / step + 0.5) + 1
+    if count == len(t):
+        return y, np.zeros(count + 1, np.int32)
+    lattice, missing = np.zeros(count), np.ones(count + 1, np.int32)
+    missing[0] = 0
+    for i in range(len(t)):
+        place = int((t[i] - t[0]) / step + 0.5)
+        lattice[place] = y[i]
+        missing[place + 1] = 0
+    for place in range(count):
+        missing[place + 1] += missing[place]
+    return lattice, missing
+
+
+@jit
+def _places(at, first, last, step, reach):
+    """The sample at or before each instant; the number of its phase, how far on it is in steps; and the phases.
+
+    Number -1 where a window reaches past an end.  Gives up after one phase too many."""
+    base, which = np.empty(len(at), np.int32), np.full(len(at), -1, np.int8)
+    phases, count, number = np.empty(_MOST_PHASES + 1), 0, 0
+    for i in range(len(at)):
+        place = (at[i] - first) / step
+        base[i] = int(np.floor(place + 1e-7))  # small integers: at this speed memory is most of the time
+        if not first + reach <= at[i] <= last - reach:
+            continue
+        phase = np.floor(min(max(place - base[i], 0.0), 1.0) * 1e6 + 0.5) / 1e6
+        if count == 0 or phases[number] != phase:
+            number = 0
+            while number < count and phases[number] != phase:
+                number += 1
+            if number == count:
+                phases[count] = phase
+                count += 1
+                if count > _MOST_PHASES:
+                    break
+        which[i] = number
+    return base, which, phases[:count]
+
+
+@jit
+def _complete(base, which, number, before, after, missing):
+    """The instants of one phase whose window misses nothing, and whether they follow one another sample by sample."""
+    here, count, even = np.empty(len(base), np.int32), 0, True
+    for i in range(len(base)):
+        if which[i] == number:
+            low, high = base[i] + before, base[i] + after + 1
+            if low >= 0 and high < len(missing) and missing[high] == missing[low]:
+                even &= count == 0 or (here[count - 1] == i - 1 and base[i] == base[i - 1] + 1)
+                here[count] = i
+                count += 1
+    return here[:count], even
+
+
+@jit
+def _correlate(y, rows, out):
+    """Correlations of y with every row into ``out`` (rows, :), in blocks that stay in the nearest cache."""
+    taps, count = rows.shape[1], out.shape[1]
+    whole = np.empty(512)
+    for begin in range(0, count, len(whole)):
+        block = whole[: min(len(whole), count - begin)]
+        for o in range(len(rows)):
+            block[:] = 0.0
+            for s in range(0, taps - 3, 4):
+                a, b, c, d = rows[o, s], rows[o, s + 1], rows[o, s + 2], rows[o, s + 3]
+                y0, y1, y2, y3 = y[begin + s :], y[begin + s + 1 :], y[begin + s + 2 :], y[begin + s + 3 :]
+                for i in range(len(block)):
+                    block[i] += a * y0[i] + b * y1[i] + c * y2[i] + d * y3[i]
+            for s in range(taps - taps % 4, taps):
+                a, y0 = rows[o, s], y[begin + s :]
+                for i in range(len(block)):
+                    block[i] += a * y0[i]
+            out[o, begin : begin + len(block)] = block
 
 
 def _direct(t, y, at, which, degree, order, neighbors, half_width, fit) -> None:
@@ -196,9 +304,8 @@ def _direct(t, y, at, which, degree, order, neighbors, half_width, fit) -> None:
         low, high = best, best + neighbors
     positive = (high - low) - (a - t[low] >= bandwidth) - (t[high - 1] - a >= bandwidth)
     bandwidth = np.where(positive < degree + 1, bandwidth * 1.5, bandwidth)  # too few that weigh: widen those
-    parts = _evaluate(t, y, a, low, high, bandwidth, degree, order)
-    fit.derivatives[:, which], fit.gain[which], fit.own[which] = parts
-    fit.half_width[which] = bandwidth
+    fit.derivatives[:, which], gains, owns = _evaluate(t, y, a, low, high, bandwidth, degree, order)
+    fit.add(which, gains, bandwidth, owns)
 
 
 @jit
