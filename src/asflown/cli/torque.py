@@ -13,7 +13,9 @@ from .output import print_doubts, print_json, provenance, say
 def torque(
     file: Path = typer.Argument(help="Telemetry: CSV (plain or gzip), Parquet, NetCDF or HDF5."),
     craft: str = CRAFT,
-    method: str = typer.Option("momentum", "--method", help="momentum, transfer, polynomial or fused."),
+    method: str = typer.Option(
+        None, "--method", help="fused (default), momentum, transfer or polynomial; --variant printed: momentum."
+    ),
     variant: str = typer.Option(
         "corrected", "--variant", help="corrected, or printed: the papers' way, faults included."
     ),
@@ -24,8 +26,15 @@ def torque(
         None, "--window", help="Full width of the local fits [s], in place of the studied one."
     ),
     prior: str = typer.Option(
-        "edges", "--prior", help="Torque of the fused method: edges (lines with corners) or smooth."
+        None, "--prior", help="Torque of the fused method: edges (default: lines with corners), matern or wiener."
     ),
+    loop: str = typer.Option(
+        None, "--loop", help="Controller of the fused method: modelled, or measured by what the actuators did."
+    ),
+    consider: str = typer.Option(
+        None, "--consider", help='One sigma of what is taken as known, as in "inertia=0.03,delay_s=0.2" (fused).'
+    ),
+    impulse: str = typer.Option(None, "--impulse", help='Angular impulse between two times [s], as in "60,141".'),
     moving: str = typer.Option("auto", "--moving", help="Mechanism whose inertia is taken off: a name, none, or auto."),
     compare: bool = typer.Option(False, "--compare", help="Set the other methods beside the chosen one."),
     start: str = START,
@@ -56,15 +65,19 @@ def torque(
         order=order,
         window_s=window,
         prior=prior,
+        loop=loop,
+        considered=_sigmas(consider),
         moving=mechanism,
     )
+    if impulse is not None:
+        result = _with_impulse(result, impulse)
     comparisons, others = [], []
     if compare:
         others = _others(telemetry, ship, result, mechanism)
         comparisons = [compare_torques(result, o, "xyz"[j]) for o in others for j in result.axes]
     options = {
-        "craft": craft, "method": method, "variant": variant, "axis": axis, "model": model, "order": order, "window_s": window, "prior": prior,
-        "moving": moving, "start": start, "stop": stop, "inertia": inertia, "cm": cm,
+        "craft": craft, "method": result.method, "variant": variant, "axis": axis, "model": model, "order": order, "window_s": window, "prior": prior,
+        "loop": loop, "consider": consider, "impulse": impulse, "moving": moving, "start": start, "stop": stop, "inertia": inertia, "cm": cm,
     }  # fmt: skip
     origin = provenance(inputs | hashes(craft), options)
     if out is not None:
@@ -88,6 +101,43 @@ def torque(
     for c in comparisons:
         print(c)
     print_doubts(result.doubts)
+
+
+def _sigmas(text: str | None) -> dict[str, float] | None:
+    """'inertia=0.03,delay_s=0.2' -> numbers by name."""
+    from asflown.kit.errors import BadInput
+
+    if text is None:
+        return None
+    found = {}
+    for part in text.split(","):
+        name, _, value = part.partition("=")
+        try:
+            found[name.strip()] = float(value)
+        except ValueError:
+            raise BadInput(
+                f"--consider {part.strip()!r} is not a name and a number", remedy='Write it as in "inertia=0.03,kp=0".'
+            ) from None
+    return found
+
+
+def _with_impulse(result, text: str):
+    """The result with the angular impulse of a span about every axis asked for."""
+    from dataclasses import replace
+
+    from asflown.kit.errors import BadInput
+
+    from .options import numbers_of
+
+    span = numbers_of(text, "--impulse")
+    first, last = result.time_s[0], result.time_s[-1]
+    if len(span) != 2 or not first <= span[0] < span[1] <= last:
+        raise BadInput(
+            f"--impulse {text!r} is not a span of this result",
+            remedy=f"Give two times between {first:g} and {last:g} s from the epoch, the earlier first.",
+        )
+    found = [(span[0], span[1], "xyz"[j], *result.impulse(span[0], span[1], "xyz"[j])) for j in result.axes]
+    return replace(result, impulses=tuple(found))
 
 
 def _check_places(out, plot) -> None:

@@ -1,158 +1,134 @@
-"""The closed loop with an unknown torque in it, as a linear stochastic model.
+"""The closed loop with an unknown torque in it: the controller and its rate filter are known.
 
 One axis has ten states: attitude and rate of the body; the rate filter's four; the wheels' momentum; the
-slow error of the attitude estimate, which the controller flies on; the torque and its slope.  Momentum,
-torque and slope are held per unit of the axis's moment of inertia, which keeps all states of one size.
+slow error of the attitude estimate, which the controller flies on; the torque and its slope.
 
     attitude'  = rate
     I rate'    = T + u + w_u                     u = I KD (KP e - F(rate)),   e = -(attitude + error)
     h'         = -u - w_u
     error'     = -error/time + w_a               a Gauss-Markov process
-    T'         = slope
-    slope'     = -2 k slope - k^2 T + w_T        k = sqrt(3)/length: Matern-3/2;  k = 0: piecewise linear
 
 w_u is what the wheels do beside their command (gyro noise in the loop, friction, a cycle of delay): it
-moves body and wheels oppositely, so total momentum never feels it.  Measured are e, the rate and h,
-each at its own times.  With ``edges`` the slope is driven by jumps of unequal size, one scale a step.
+moves body and wheels oppositely, so total momentum never feels it.  Measured are e, the rate and h.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
 from ..craft.model import WheelController
-from ..kit.smoother import Measurements, Model, discretize
+from ..kit.regression import noise_sigma
+from ..kit.smoother import Measurements, Smoothed
+from .latent import ATTITUDE_ERROR, BODY_RATE, MOMENTUM, ROWS, Body, Levels, Series, Times, response
 
-STATES = 10
-ATTITUDE, RATE, FILTER, MOMENTUM, ERROR, TORQUE, SLOPE = 0, 1, 2, 6, 7, 8, 9
-CHANNELS = ("attitude_error", "body_rate", "momentum")
+_ATTITUDE, _RATE, _FILTER, _STORED, _ERROR, _TORQUE, _STATES = 0, 1, 2, 6, 7, 8, 10
 
 
 @dataclass(frozen=True)
-class Levels:
-    """What is fitted on one axis, SI: sizes and times of the unknown processes and of the noises."""
+class LoopLevels(Levels):
+    """Fitted on one axis of a body under known control."""
 
-    torque_Nm: float
-    length_s: float
-    error_white_rad: float
     rate_white_rad_s: float
     momentum_white_Nms: float
+    error_white_rad: float
     error_slow_rad: float
     error_time_s: float
     reaction_Nm_sqrt_s: float  # square root of w_u's spectral density
 
-    def logs(self) -> np.ndarray:
-        return np.log([getattr(self, n) for n in self.__dataclass_fields__])
+
+@dataclass(frozen=True, kw_only=True)
+class HeldBody(Body):
+    """A body whose controller is known.
+
+    ``delay_s``: of the loop beyond its rate filter, to first order; zero but for asking what a delay would do."""
+
+    kp_per_s: float
+    kd_per_s: float
+    filter_rad_s: float
+    filter_damping: float
+    delay_s: float = 0.0
+
+    STATES: ClassVar[int] = _STATES
+    RATE: ClassVar[int] = _RATE
+    STORED: ClassVar[int] = _STORED
+    SPREAD: ClassVar[tuple[float, ...]] = (1.5, 0.8, 0.7, 0.7, 0.7, 1.0, 0.7, 1.5)
 
     @classmethod
-    def from_logs(cls, p) -> Levels:
-        return cls(*np.exp(p).tolist())
+    def under(cls, controller: WheelController, inertia_kgm2: float, *, wiener: bool = False) -> HeldBody:
+        f = controller.rate_filter
+        return cls(
+            inertia_kgm2=inertia_kgm2, wiener=wiener, kp_per_s=controller.kp_per_s, kd_per_s=controller.kd_per_s,
+            filter_rad_s=f.natural_frequency, filter_damping=f.damping,
+        )  # fmt: skip
 
-
-@dataclass(frozen=True)
-class Body:
-    """One axis of a body under control."""
-
-    inertia_kgm2: float
-    controller: WheelController
-
-    def dynamics(self, v: Levels, edges: bool):
-        """F, spectral density of the fixed noises, and of the slope's noise at scale 1; (10, 10) each."""
-        k = self.controller
-        w, z = k.rate_filter.natural_frequency, k.rate_filter.damping
-        F, Q, drive = np.zeros((3, STATES, STATES))
-        F[ATTITUDE, RATE] = 1
-        F[RATE, [ATTITUDE, ERROR, FILTER + 2, TORQUE]] = (
-            -k.kd_per_s * k.kp_per_s,
-            -k.kd_per_s * k.kp_per_s,
-            -k.kd_per_s,
-            1,
-        )
-        F[MOMENTUM] = -F[RATE]
-        F[MOMENTUM, TORQUE] = 0
-        for stage, source in ((FILTER, RATE), (FILTER + 2, FILTER)):
+    def dynamics(self, v: LoopLevels) -> tuple[np.ndarray, np.ndarray]:
+        z = self.filter_damping
+        w = 4 * z / (4 * z / self.filter_rad_s + self.delay_s)  # the cascade's delay is 4 z / w
+        stiffness = -self.kd_per_s * self.kp_per_s
+        F, Q = np.zeros((2, _STATES, _STATES))
+        F[_ATTITUDE, _RATE] = 1
+        F[_RATE, [_ATTITUDE, _ERROR, _FILTER + 2, _TORQUE]] = stiffness, stiffness, -self.kd_per_s, 1
+        F[_RATE, _RATE] = -stiffness * self.delay_s
+        F[_STORED] = -F[_RATE]
+        F[_STORED, _TORQUE] = 0
+        for stage, source in ((_FILTER, _RATE), (_FILTER + 2, _FILTER)):
             F[stage, stage + 1] = 1
             F[stage + 1, [source, stage, stage + 1]] = w**2, -(w**2), -2 * z * w
-        F[ERROR, ERROR] = -1 / v.error_time_s
-        Q[ERROR, ERROR] = 2 * v.error_slow_rad**2 / v.error_time_s
-        rate = 0.0 if edges else np.sqrt(3) / v.length_s
-        F[TORQUE, SLOPE] = 1
-        F[SLOPE, [TORQUE, SLOPE]] = -(rate**2), -2 * rate
-        drive[SLOPE, SLOPE] = slope_density(v) / self.inertia_kgm2**2
-        spread = np.zeros(STATES)  # where w_u goes
-        spread[RATE], spread[MOMENTUM] = 1, -1
+        F[_ERROR, _ERROR] = -1 / v.error_time_s
+        Q[_ERROR, _ERROR] = 2 * v.error_slow_rad**2 / v.error_time_s
+        spread = np.zeros(_STATES)  # where w_u goes
+        spread[_RATE], spread[_STORED] = 1, -1
         Q += (v.reaction_Nm_sqrt_s / self.inertia_kgm2) ** 2 * np.outer(spread, spread)
-        return F, Q, drive
+        return F, Q
 
-    def model(self, v: Levels, times: Times, *, edges: bool = False) -> Model:
-        """The model at the measurement times, all scales 1."""
-        I = self.inertia_kgm2  # noqa: E741
-        F, Q, drive = self.dynamics(v, edges)
-        A, fixed = discretize(F, Q, times.steps_s)
-        driven = discretize(F, drive, times.steps_s)[1][None]
-        H = np.zeros((3, STATES))
-        H[0, [ATTITUDE, ERROR]] = -1
-        H[1, RATE] = 1
-        H[2, MOMENTUM] = I
-        R = np.square([v.error_white_rad, v.rate_white_rad_s, v.momentum_white_Nms])
-        slope = v.torque_Nm / I * np.sqrt(3) / v.length_s
-        momentum = 10 * v.momentum_white_Nms / I + times.largest_rate_rad_s
-        start = [
-            times.largest_error_rad,
-            *[times.largest_rate_rad_s] * 5,
-            momentum,
-            v.error_slow_rad,
-            v.torque_Nm / I,
-            slope,
-        ]
-        scale = np.ones((len(times.which), 1))
-        return Model(A, fixed, driven, scale, times.which, H, R, np.zeros(STATES), np.diag(np.square(start)))
+    def sensitivities(self, v: LoopLevels, times: Times, data: Measurements, best: Smoothed) -> dict[str, np.ndarray]:
+        """The torque's own answer under other numbers; per unit inertia the loop has the craft's own gains."""
+        torque = self.inertia_kgm2 * best.mean[:, _TORQUE]
+        here = response(self, v, times, data, torque)
+        stored = data.row == MOMENTUM
+        changes = {
+            "kp": (0.01, replace(self, kp_per_s=1.01 * self.kp_per_s)),
+            "kd": (0.01, replace(self, kd_per_s=1.01 * self.kd_per_s)),
+            "delay_s": (0.05, replace(self, delay_s=0.05)),
+        }
+        found = {
+            name: (response(other, v, times, data, torque) - here) / step for name, (step, other) in changes.items()
+        }
+        return found | {"inertia": np.where(stored, 0.0, -here), "spin_inertia": np.where(stored, here, 0.0)}
 
+    def measured(self, v: LoopLevels) -> tuple[np.ndarray, np.ndarray]:
+        H = np.zeros((len(ROWS), _STATES))
+        H[ATTITUDE_ERROR, [_ATTITUDE, _ERROR]] = -1
+        H[BODY_RATE, _RATE] = 1
+        H[MOMENTUM, _STORED] = self.inertia_kgm2
+        return H, np.array([v.error_white_rad, v.rate_white_rad_s, v.momentum_white_Nms, np.inf])
 
-def slope_density(v: Levels) -> float:
-    """Spectral density that gives a Matern-3/2 torque its size."""
-    return 4 * (np.sqrt(3) / v.length_s) ** 3 * v.torque_Nm**2
+    def start(self, v: LoopLevels, times: Times) -> np.ndarray:
+        turning = 3 * times.largest[BODY_RATE] + 1e-5
+        stored = 10 * v.momentum_white_Nms / self.inertia_kgm2 + turning
+        return np.array([3 * times.largest[ATTITUDE_ERROR] + 1e-4, *[turning] * 5, stored, v.error_slow_rad])
 
-
-@dataclass(frozen=True)
-class Times:
-    """The instants of a pass: every sample's, and those wanted beside them."""
-
-    seconds: np.ndarray  # (N,)
-    steps_s: np.ndarray  # the different steps
-    which: np.ndarray  # (N,)
-    wanted: np.ndarray  # (N,) bool
-    largest_error_rad: float
-    largest_rate_rad_s: float
-
-
-@dataclass(frozen=True)
-class Series:
-    """One measured series of one axis: row of the model's H, seconds from the grid's start, values."""
-
-    row: int
-    seconds: np.ndarray
-    values: np.ndarray
+    def starting_levels(self, series) -> LoopLevels:
+        by_row = {s.row: s for s in series}
+        h = by_row[MOMENTUM]
+        push = max(float(np.std(np.gradient(h.values, h.seconds))), 1e-7)
+        white = white_noise(by_row[ATTITUDE_ERROR], 1e-9)
+        return LoopLevels(
+            torque_Nm=push,
+            length_s=15.0,
+            rate_white_rad_s=white_noise(by_row[BODY_RATE], 1e-10),
+            momentum_white_Nms=white_noise(h, 1e-6),
+            error_white_rad=white,
+            error_slow_rad=1.5 * white,
+            error_time_s=15.0,
+            reaction_Nm_sqrt_s=max(0.05 * push, 1e-6),
+        )
 
 
-def arrange(series: list[Series], wanted_s: np.ndarray | None = None) -> tuple[Times, Measurements]:
-    """Merge series of different times into one pass.  Times are taken to the millisecond."""
-    everything = [np.round(s.seconds * 1e3).astype(np.int64) for s in series]
-    extra = np.round(np.asarray([] if wanted_s is None else wanted_s) * 1e3).astype(np.int64)
-    ms = np.unique(np.concatenate([*everything, extra]))
-    place = np.concatenate([np.searchsorted(ms, e) for e in everything])
-    row = np.concatenate([np.full(len(s.values), s.row) for s in series])
-    value = np.concatenate([s.values for s in series])
-    order = np.argsort(place, kind="stable")
-    start = np.searchsorted(place[order], np.arange(len(ms) + 1))
-    steps, which = np.unique(np.diff(ms), return_inverse=True)
-
-    def largest(kind: int) -> float:
-        return max((float(np.max(np.abs(s.values), initial=0.0)) for s in series if s.row == kind), default=0.0)
-
-    wanted = np.isin(ms, extra)
-    first = np.concatenate([[0], which])
-    times = Times(ms / 1e3, steps / 1e3, first, wanted, 3 * largest(0) + 1e-4, 3 * largest(1) + 1e-5)
-    return times, Measurements(start, row[order], value[order])
+def white_noise(s: Series, least: float) -> float:
+    """A series' white noise, from local fits; at least ``least``."""
+    sigma = noise_sigma(s.seconds, s.values, degree=3, half_width=4 * float(np.median(np.diff(s.seconds))))
+    return max(sigma, least) if np.isfinite(sigma) else least

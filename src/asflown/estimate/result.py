@@ -12,13 +12,31 @@ from ..kit.files import write_text
 AXES = ("x", "y", "z")
 
 
+#: Half of a peak's surroundings in which its own extremum is looked for. [s]
+_PEAK_REACH_S = 5.0
+
+
+def spread(samples: np.ndarray) -> np.ndarray:
+    """One sigma of samples (K, ...) with tails: the mean of what their middle 68 % and 95 % each say of it.
+
+    A posterior of corners is narrow with long tails: its standard deviation is that of the tails, its
+    68 % interval that of the middle.  Normal samples give their standard deviation."""
+    low95, low68, high68, high95 = np.quantile(samples, [0.025, 0.1587, 0.8413, 0.975], axis=0)
+    return 0.25 * ((high68 - low68) + (high95 - low95) / 1.96)
+
+
 @dataclass(frozen=True)
 class Peak:
-    """One excursion: its time (seconds from the epoch), torque [N m] and axis."""
+    """One excursion: its time (seconds from the epoch), torque [N m], axis, and sigma where there is one."""
 
     time_s: float
     torque_Nm: float
     axis: str
+    sigma_Nm: float | None = None
+
+    def record(self, with_axis: bool) -> dict:
+        record: dict = {"time_s": self.time_s, "torque_Nm": self.torque_Nm, "sigma_Nm": self.sigma_Nm}
+        return record | {"axis": self.axis} if with_axis else record
 
 
 @dataclass(frozen=True)
@@ -43,6 +61,9 @@ class TorqueResult:
     settings: dict = field(default_factory=dict)  # what the estimator chose: windows, model, inertia
     fits: tuple[dict, ...] = ()  # the polynomial method's orders and misfits
     paths_Nm: np.ndarray | None = None  # (K, M, 3), torques drawn from the joint posterior
+    impulses: tuple[
+        tuple[float, float, str, float, float | None], ...
+    ] = ()  # asked for: start, stop, axis, value, sigma
 
     @property
     def axes(self) -> tuple[int, ...]:
@@ -51,6 +72,15 @@ class TorqueResult:
     @property
     def peaks(self) -> list[Peak]:
         return [p for a in self.axes for p in find_peaks(self, a)]
+
+    def band(self, share: float) -> tuple[np.ndarray, np.ndarray] | None:
+        """Lower and upper bound (M, 3) of the middle ``share`` of the posterior; None for a method without one."""
+        if self.paths_Nm is None:
+            return None
+        known = np.isfinite(self.torque_Nm)
+        bounds = np.full((2, *self.torque_Nm.shape), np.nan)
+        bounds[:, known] = np.quantile(self.paths_Nm[:, known], [0.5 - share / 2, 0.5 + share / 2], axis=0)
+        return bounds[0], bounds[1]
 
     def impulse(self, start_s: float, stop_s: float, axis: str) -> tuple[float, float | None]:
         """Angular impulse about an axis between two instants (seconds from the epoch), and its sigma. [N m s]
@@ -66,8 +96,7 @@ class TorqueResult:
 
         if self.paths_Nm is None:
             return area(self.torque_Nm[:, j]), None
-        drawn = [area(p[:, j]) for p in self.paths_Nm]
-        return area(self.torque_Nm[:, j]), float(np.std(drawn, ddof=1))
+        return area(self.torque_Nm[:, j]), float(spread(np.array([area(p[:, j]) for p in self.paths_Nm])))
 
     def peak_height(self, time_s: float, reach_s: float, axis: str) -> tuple[float, float | None]:
         """Height of the excursion within ``reach_s`` of a time, and its sigma. [N m]
@@ -81,7 +110,7 @@ class TorqueResult:
         if self.paths_Nm is None:
             return float(sign * np.max(sign * mean)), None
         heights = sign * np.max(sign * self.paths_Nm[:, near, j], axis=1)
-        return float(heights.mean()), float(heights.std(ddof=1))
+        return float(heights.mean()), float(spread(heights))
 
     @property
     def unit(self) -> str:
@@ -103,7 +132,7 @@ class TorqueResult:
             band = "" if self.sigma_Nm is None else f"   1 sigma {np.nanmedian(self.sigma_Nm[:, j]):.2g}"
             lines.append(f"  {AXES[j]}   mean {np.nanmean(t):+.3g}   rms {np.sqrt(np.nanmean(t**2)):.3g}{band}")
             peaks = find_peaks(self, j)
-            lines += [f"      peak {p.torque_Nm:+.4g} at {p.time_s:.0f} s" for p in peaks[:12]]
+            lines += [f"      peak {_value(p)} at {p.time_s:.0f} s" for p in peaks[:12]]
             if len(peaks) > 12:
                 lines.append(f"      and {len(peaks) - 12} more peaks")
         for f in self.fits:
@@ -111,7 +140,15 @@ class TorqueResult:
                 rms = next(v for k, v in f.items() if k.startswith("rms_") and k != "rms_percent")
                 share = "" if f["rms_percent"] is None else f" ({f['rms_percent']:.2f} % of the mean size)"
                 lines.append(f"  order {f['order']:2d}, {f['channel']} {f['axis']}: rms misfit {rms:.4g}{share}")
+        for start, stop, axis, value, sigma in self.impulses:
+            band = "" if sigma is None else f" +- {sigma:.2g}"
+            unit = "rad/s, per unit spin inertia" if self.relative else "N m s"
+            lines.append(f"  impulse {axis} from {start:g} to {stop:g} s: {value:+.4g}{band} {unit}")
         return "\n".join(lines)
+
+    def _band_record(self, share: float) -> dict:
+        low, high = self.band(share) or (None, None)
+        return {"low": self.column(low), "high": self.column(high)}
 
     def column(self, values) -> np.ndarray | None:
         """(M,) of the one axis, or (M, 3)."""
@@ -123,10 +160,8 @@ class TorqueResult:
         """The JSON form, without command and provenance."""
         names = ("torque_Nm", "sigma_Nm", "momentum_Nms")
         values = {n: self.column(getattr(self, n)) for n in names}
-        peaks: list[dict] = [
-            {"time_s": p.time_s, "torque_Nm": p.torque_Nm} | ({"axis": p.axis} if self.axis == "all" else {})
-            for p in self.peaks
-        ]
+        peaks = [p.record(with_axis=self.axis == "all") for p in self.peaks]
+        bands = {f"band_{n}_Nm": self._band_record(n / 100) for n in (68, 95) if self.paths_Nm is not None}
         record = {
             "craft": self.craft,
             "method": self.method,
@@ -135,10 +170,16 @@ class TorqueResult:
             "epoch": self.epoch,
             "time_s": self.time_s,
             **values,
+            **bands,
             "peaks": peaks,
             "doubts": list(self.doubts),
             "settings": self.settings,
         }
+        impulses = [
+            {"start_s": a, "stop_s": b, "axis": x, "impulse_Nms": v, "sigma_Nms": e} for a, b, x, v, e in self.impulses
+        ]
+        if impulses:
+            record["impulses"] = impulses
         if self.relative:  # a number per unit spin inertia must not stand under a key that says N m
             record |= {
                 "torque_Nm": None,
@@ -148,8 +189,14 @@ class TorqueResult:
                 "sigma_per_spin_inertia_rad_s2": values["sigma_Nm"],
                 "momentum_per_spin_inertia_rad_s": values["momentum_Nms"],
             }
+            for n in bands:
+                record[n.replace("_Nm", "_per_spin_inertia_rad_s2")], record[n] = record[n], None
             for p in peaks:
                 p["torque_per_spin_inertia_rad_s2"], p["torque_Nm"] = p["torque_Nm"], None
+                p["sigma_per_spin_inertia_rad_s2"], p["sigma_Nm"] = p["sigma_Nm"], None
+            for i in impulses:
+                i["impulse_per_spin_inertia_rad_s"], i["impulse_Nms"] = i["impulse_Nms"], None
+                i["sigma_per_spin_inertia_rad_s"], i["sigma_Nms"] = i["sigma_Nms"], None
         if self.fits:
             record["fits"] = list(self.fits)
         return record
@@ -170,7 +217,21 @@ def find_peaks(result: TorqueResult, axis: int) -> list[Peak]:
     for sign in (1, -1):
         at, _ = signal.find_peaks(sign * filled, height=threshold, prominence=threshold)
         found += at.tolist()
-    return [Peak(float(result.time_s[k]), float(torque[k]), AXES[axis]) for k in sorted(found) if sure[k]]
+    peaks = []
+    for k in sorted(found):
+        if sure[k]:
+            t = float(result.time_s[k])
+            drawn = (
+                (float(torque[k]), None)
+                if result.paths_Nm is None
+                else result.peak_height(t, _PEAK_REACH_S, AXES[axis])
+            )
+            peaks.append(Peak(t, drawn[0], AXES[axis], drawn[1]))
+    return peaks
+
+
+def _value(peak: Peak) -> str:
+    return f"{peak.torque_Nm:+.4g}" + ("" if peak.sigma_Nm is None else f" +- {peak.sigma_Nm:.2g}")
 
 
 def save_csv(result: TorqueResult, path, provenance: dict) -> None:

@@ -9,12 +9,12 @@ import numpy as np
 from ..craft.model import Craft
 from ..kit.errors import BadInput, some_of
 from ..telemetry.telemetry import Telemetry
-from . import torque_fused, torque_momentum, torque_polynomial, torque_transfer
+from . import records, torque_fused, torque_momentum, torque_polynomial, torque_transfer
 from .compare import consistency_doubts
 from .result import AXES, TorqueResult, find_peaks
 from .subject import Subject, slews, subject_of, thrusters_firing
 
-METHODS = ("momentum", "transfer", "polynomial", "fused")
+METHODS = ("fused", "momentum", "transfer", "polynomial")
 VARIANTS = ("corrected", "printed")
 
 
@@ -22,35 +22,45 @@ def disturbance_torque(
     telemetry: Telemetry,
     craft: Craft,
     *,
-    method: str = "momentum",
+    method: str | None = None,
     variant: str = "corrected",
     axis: str = "all",
     model: str | None = None,
     order: int = 12,
     window_s: float | None = None,
-    prior: str = "edges",
+    prior: str | None = None,
+    loop: str | None = None,
+    considered: dict[str, float] | None = None,
     moving: str | None = "auto",
 ) -> TorqueResult:
     """The torque on the body that the actuators did not command, in body axes. [N m]
 
-    ``method``: 'momentum' (000 eqs 2-9), 'transfer' (000 eqs 10-20; ``model`` low, hankel or full),
-    'polynomial' (004 eqs 7, 17, 18; ``order`` 6, 12, 15 or 18) or 'fused' (all channels at once; ``prior``
-    edges or smooth).  ``variant``: 'corrected', or 'printed', the paper's way with its faults.  ``window_s``:
-    full width of the corrected methods' local fits, in place of the studied one.  ``moving``: see
-    ``subject_of``.
+    ``method``: 'fused' (all channels at once), 'momentum' (000 eqs 2-9), 'transfer' (000 eqs 10-20; ``model``
+    low, hankel or full) or 'polynomial' (004 eqs 7, 17, 18; ``order`` 6, 12, 15 or 18); None: fused, and for
+    the printed variant momentum.  ``variant``: 'corrected', or 'printed', the paper's way with its faults.
+    ``prior``, ``loop``, ``considered``: of the fused method, see ``torque_fused.fused``.  ``window_s``: full width of
+    the corrected methods' local fits, in place of the studied one.  ``moving``: see ``subject_of``.
 
     Positive torque turns the body about +axis.  Raises BadInput where the telemetry lacks what the
     method needs, names wheels the craft does not have, or is shorter than the window."""
-    _check(method, METHODS, "method")
     _check(variant, VARIANTS, "variant")
-    _check(prior, torque_fused.PRIORS, "prior")
+    method = method or ("momentum" if variant == "printed" else "fused")
+    _check(method, METHODS, "method")
+    for name, value, allowed in (("prior", prior, torque_fused.PRIORS), ("loop", loop, records.LOOPS)):
+        if value is not None:
+            _check(value, allowed, name)
+    _check_considered(considered)
+    if method != "fused" and (prior or loop or considered):
+        raise BadInput(
+            f"the {method} method has no prior, loop or considered quantities to choose", remedy="Use --method fused."
+        )
     _check(axis, (*AXES, "all"), "axis")
     if model is not None:
         _check(model, torque_transfer.MODELS, "model")
     if window_s is not None and not 0 < window_s < 1e9:
         raise BadInput(f"a window of {window_s} s is not possible", remedy="Give a positive number of seconds.")
     if method == "fused" and variant == "printed":
-        raise BadInput("the fused method is in no paper", remedy="Leave --variant out.")
+        raise BadInput("the fused method is in no paper", remedy="Leave --variant out, or name the paper's --method.")
     _check(order, torque_polynomial.ORDERS, "order")
     if model is not None and method in ("momentum", "fused"):
         raise BadInput(
@@ -60,7 +70,7 @@ def disturbance_torque(
         raise BadInput(f"the {method} method, {variant}, has no window to choose", remedy="Leave --window out.")
     subject = subject_of(telemetry, craft, moving)
     try:
-        answer = _run(subject, method, variant, axis, model, order, window_s, prior)
+        answer = _run(subject, method, variant, axis, model, order, window_s, (prior, loop, considered))
     except BadInput as why:
         raise why.within(telemetry.source) from why.__cause__
     grid, torque, sigma, momentum, settings, doubts, fits, *paths = answer
@@ -92,11 +102,13 @@ def disturbance_torque(
     return _with_doubts(result, doubts)
 
 
-def _run(subject: Subject, method, variant, axis, model, order, window_s, prior):
+def _run(subject: Subject, method, variant, axis, model, order, window_s, of_fused):
     if method == "polynomial":
         return torque_polynomial.polynomial(subject, order, model or "low")
     if method == "fused":
-        *answer, paths = torque_fused.fused(subject, prior, (0, 1, 2) if axis == "all" else (AXES.index(axis),))
+        prior, loop, considered = of_fused
+        axes = (0, 1, 2) if axis == "all" else (AXES.index(axis),)
+        *answer, paths = torque_fused.fused(subject, prior, axes, loop, considered)
         return (*answer, (), paths)
     module = {"momentum": torque_momentum, "transfer": torque_transfer}[method]
     options: dict = {}
@@ -114,6 +126,16 @@ def _run(subject: Subject, method, variant, axis, model, order, window_s, prior)
 def _check(value, allowed, what):
     if value not in allowed:
         raise BadInput(f"{what} {value!r} is not known", remedy=f"Choose one of: {some_of(allowed)}.")
+
+
+def _check_considered(considered: dict[str, float] | None) -> None:
+    for name, sigma in (considered or {}).items():
+        _check(name, torque_fused.CONSIDERED, "considered quantity")
+        if not 0 <= sigma < 1:
+            raise BadInput(
+                f"a sigma of {sigma} for {name} is not possible",
+                remedy="Give a share such as 0.02 (delay_s: seconds); 0 takes the quantity as exact.",
+            )
 
 
 def _inertia_used(subject: Subject) -> dict:

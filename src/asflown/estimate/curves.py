@@ -1,0 +1,33 @@
+"""A torque that is a Gaussian process: smoothed exactly, jointly with what is taken as known.
+
+A quantity taken as known (an inertia, a gain) is off by d sigma, d ~ N(0, 1), and changes the
+measurements by a column of sensitivities times d.  The filter whitens data and columns alike; d is then
+an ordinary regression, and the smoothed torque is linear in it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..kit.ensemble import gains, paths, smoothed, whiten
+from ..kit.smoother import Measurements, smooth
+from .latent import Body, Posterior, Times
+
+
+def gaussian_torque(
+    body: Body, levels, times: Times, data: Measurements, columns: np.ndarray, count: int, rng: np.random.Generator
+) -> Posterior:
+    """The posterior at fixed ``levels``, with ``count`` paths; ``columns``: (M, P), of one sigma each."""
+    model = body.smooth_model(levels, times)
+    g, best = gains(model, data), smooth(model, data)
+    X = whiten(g, columns)
+    precision = X.T @ X + np.eye(X.shape[1])
+    offset = np.linalg.solve(precision, X.T @ g.own)
+    spread = np.linalg.cholesky(np.linalg.inv(precision))
+    drawn = offset + rng.standard_normal((count, len(offset))) @ spread.T
+    torque = [body.torque]
+    moved = smoothed(g, columns, torque)[:, 0, :]  # (N, P): what a sigma of each does to the torque
+    mean = best.mean[:, body.torque] - moved @ offset
+    drawn_paths = paths(g, data.value[:, None] - columns @ drawn.T, torque, rng)[:, :, 0]
+    size = body.inertia_kgm2
+    return Posterior(size * mean, size * drawn_paths, drawn, g.own - X @ offset, {})

@@ -1,0 +1,206 @@
+"""What the fused method's models share: series at their own times, and a torque as a random process.
+
+A model of one axis is a linear stochastic one whose last two states are the torque and its slope.  All
+torques, momenta and their slopes are held per unit of the axis's moment of inertia, which keeps every
+state of one size.
+
+    T'     = slope
+    slope' = -2 k slope - k^2 T + w        k = sqrt(3)/length: a Matern-3/2 torque of a given size
+                                           k = 0: an integrated Wiener process; k = 0, w = 0: a straight line
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from typing import ClassVar
+
+import numpy as np
+
+from ..kit.ensemble import respond
+from ..kit.smoother import Measurements, Model, Smoothed, discretize
+
+#: Rows of every model's H, by what is measured.
+ROWS = ("attitude_error", "body_rate", "momentum", "control_torque")
+ATTITUDE_ERROR, BODY_RATE, MOMENTUM, CONTROL_TORQUE = range(4)
+
+
+@dataclass(frozen=True)
+class Series:
+    """One measured series of one axis: its row, seconds from the grid's start, values, its smallest step."""
+
+    row: int
+    seconds: np.ndarray
+    values: np.ndarray
+    quantum: float = 0.0
+
+    def later(self, seconds: float) -> Series:
+        """The same values taken to be measured later."""
+        return replace(self, seconds=self.seconds + seconds)
+
+    def between(self, start_s: float, stop_s: float) -> Series:
+        inside = (self.seconds >= start_s) & (self.seconds <= stop_s)
+        return replace(self, seconds=self.seconds[inside], values=self.values[inside])
+
+
+@dataclass(frozen=True)
+class Times:
+    """The instants of a pass, every sample's and those wanted beside them, and the size of what was measured."""
+
+    seconds: np.ndarray  # (N,)
+    steps_s: np.ndarray  # the different steps
+    which: np.ndarray  # (N,)
+    wanted: np.ndarray  # (N,) bool
+    largest: np.ndarray  # (rows,), of each row's values; 0 where there are none
+    quantum: np.ndarray  # (rows,)
+
+
+def arrange(series, wanted_s: np.ndarray | None = None) -> tuple[Times, Measurements]:
+    """Merge series of different times into one pass.  Times are taken to the millisecond."""
+    everything = [np.round(s.seconds * 1e3).astype(np.int64) for s in series]
+    extra = np.round(np.asarray([] if wanted_s is None else wanted_s) * 1e3).astype(np.int64)
+    ms = np.unique(np.concatenate([*everything, extra]))
+    place = np.concatenate([np.searchsorted(ms, e) for e in everything])
+    row = np.concatenate([np.full(len(s.values), s.row) for s in series])
+    value = np.concatenate([s.values for s in series])
+    order = np.argsort(place, kind="stable")
+    start = np.searchsorted(place[order], np.arange(len(ms) + 1))
+    steps, which = np.unique(np.diff(ms), return_inverse=True)
+    largest, quantum = np.zeros(len(ROWS)), np.zeros(len(ROWS))
+    for s in series:
+        largest[s.row] = max(largest[s.row], float(np.max(np.abs(s.values), initial=0.0)))
+        quantum[s.row] = max(quantum[s.row], s.quantum)
+    first = np.concatenate([[0], which])
+    times = Times(ms / 1e3, steps / 1e3, first, np.isin(ms, extra), largest, quantum)
+    return times, Measurements(start, row[order], value[order])
+
+
+def step_of(data: Measurements) -> np.ndarray:
+    """The step at which each measurement was taken. (M,)"""
+    return np.searchsorted(data.start, np.arange(len(data.row)), side="right") - 1
+
+
+@dataclass(frozen=True)
+class Levels:
+    """What is fitted on one axis, SI: sizes and times of the unknown processes and of the noises, all positive."""
+
+    torque_Nm: float
+    length_s: float
+
+    def logs(self) -> np.ndarray:
+        return np.log([getattr(self, f.name) for f in fields(self)])
+
+    @classmethod
+    def from_logs(cls, p):
+        return cls(*np.exp(p).tolist())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """One axis of a body.  A kind of body adds its own states, its Levels and what it measures.
+
+    ``wiener``: the torque is an integrated Wiener process, not a Matern one."""
+
+    inertia_kgm2: float
+    wiener: bool = False
+
+    STATES: ClassVar[int]
+    RATE: ClassVar[int]  # index of the body rate, and of the actuators' momentum
+    STORED: ClassVar[int]
+    SPREAD: ClassVar[tuple[float, ...]]  # of the weak log-normal priors, in the order of the Levels
+
+    @property
+    def torque(self) -> int:
+        return self.STATES - 2
+
+    @property
+    def slope(self) -> int:
+        return self.STATES - 1
+
+    def dynamics(self, v) -> tuple[np.ndarray, np.ndarray]:
+        """F and spectral density of all but the torque's own two rows."""
+        raise NotImplementedError
+
+    def measured(self, v) -> tuple[np.ndarray, np.ndarray]:
+        """H (rows, n) and the white noise of each row."""
+        raise NotImplementedError
+
+    def start(self, v, times: Times) -> np.ndarray:
+        """Standard deviation of every state but the torque's two at the first instant."""
+        raise NotImplementedError
+
+    def starting_levels(self, series):
+        """Levels to start a fit from, from the series alone."""
+        raise NotImplementedError
+
+    def sensitivities(self, v, times: Times, data: Measurements, best: Smoothed) -> dict[str, np.ndarray]:
+        """By what each measurement (M,) changes where a quantity taken as known is off.
+
+        Names are those of torque_fused.CONSIDERED; per share of the quantity, or per second.  ``best``:
+        states smoothed with it as it was given."""
+        raise NotImplementedError
+
+    def model(self, v, times: Times, length_s: float, size_Nm) -> Model:
+        """The model at the instants of a pass; ``size_Nm``: of the torque, one for all or (N,)."""
+        F, Q = self.dynamics(v)
+        drive = np.zeros_like(Q)
+        k = np.sqrt(3) / length_s
+        F[self.torque, self.slope] = 1
+        if not self.wiener:
+            F[self.slope, [self.torque, self.slope]] = -(k**2), -2 * k
+        drive[self.slope, self.slope] = 4 * k**3 / self.inertia_kgm2**2
+        A, fixed = discretize(F, Q, times.steps_s)
+        driven = discretize(F, drive, times.steps_s)[1][None]
+        size = np.broadcast_to(np.asarray(size_Nm, float), times.seconds.shape)
+        # a Wiener torque has no size of its own: it starts within ten times what a Matern one would be
+        first = size[0] / self.inertia_kgm2 * (10 if self.wiener else 1)
+        deviation = np.concatenate([self.start(v, times), [first, k * first]])
+        H, white = self.measured(v)
+        R = white**2 + times.quantum**2 / 12
+        return Model(
+            A, fixed, driven, size[:, None] ** 2, times.which, H, R, np.zeros(self.STATES), np.diag(deviation**2)
+        )
+
+    def smooth_model(self, v, times: Times) -> Model:
+        """With the torque of the fitted levels."""
+        return self.model(v, times, v.length_s, v.torque_Nm)
+
+    def lines(self, v, times: Times) -> np.ndarray:
+        """Transitions (types, n, n) under which the torque is a straight line."""
+        F, Q = self.dynamics(v)
+        F[self.torque, self.slope] = 1
+        return discretize(F, Q, times.steps_s)[0]
+
+
+#: A torque [N m] known beforehand, at given instants [s].
+Known = Callable[[np.ndarray], np.ndarray]
+
+
+def response(body: Body, levels, times: Times, data: Measurements, torque_Nm) -> np.ndarray:
+    """Measurements (M,) or (M, C), without noise, of torques (N,) or (N, C) [N m] that are straight lines between instants."""
+    torque = np.asarray(torque_Nm, float) / body.inertia_kgm2
+    columns = torque[:, None] if torque.ndim == 1 else torque
+    model = body.smooth_model(levels, times)
+    out = respond(body.lines(levels, times), model, data, body.torque, body.slope, columns)
+    return out[:, 0] if torque.ndim == 1 else out
+
+
+def without_known(body: Body, levels, times: Times, data: Measurements, known: Known | None) -> Measurements:
+    """The measurements less what a known torque does to them."""
+    if known is None:
+        return data
+    return replace(data, value=data.value - response(body, levels, times, data, known(times.seconds)))
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """The torque of one axis given its measurements, on the instants of a pass.
+
+    ``mean``: (N,) [N m]; ``paths``: (K, N), drawn jointly; ``considered``: (K, P), drawn, of the quantities
+    taken as known, in units of their sigma; ``whitened``: (M,), what prediction leaves, over its sigma."""
+
+    mean: np.ndarray
+    paths: np.ndarray
+    considered: np.ndarray
+    whitened: np.ndarray
+    settings: dict

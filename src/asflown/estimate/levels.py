@@ -1,0 +1,154 @@
+"""Levels of largest posterior on one axis: sizes, times and noises, outliers, and clocks that disagree.
+
+Marginal likelihood of all samples under the smooth (Matern) torque, with weak log-normal priors that keep
+what the data say nothing about near where the channels themselves put it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import optimize
+
+from ..kit.smoother import Measurements, log_likelihood, smooth
+from .latent import ROWS, Body, Known, Levels, Series, Times, arrange, step_of, without_known
+
+#: A sample whose innovation is larger than this many sigma is left out. [sigma]
+OUTLYING = 5.0
+#: An offset between channels is corrected when it is this sure, and this large. [sigma], [s]
+_SURE, _WORTH_S = 4.0, 0.2
+#: Furthest offset looked for. [s]
+_REACH_S = 3.0
+#: Samples of a long record that the levels are fitted to, in blocks spread evenly over it.
+_MOST_FITTED, _BLOCKS = 9000, 3
+
+
+@dataclass(frozen=True)
+class Offset:
+    """By how much a channel's times are late against the actuators', from the likelihood's profile."""
+
+    seconds: float
+    sigma: float
+    corrected: bool
+
+
+@dataclass(frozen=True)
+class AxisFit:
+    """What was fitted on one axis."""
+
+    levels: Levels
+    series: tuple[Series, ...]  # without outliers, offsets corrected
+    left_out: int
+    offsets: dict[str, Offset]
+
+
+def fit_levels(body: Body, series: list[Series], known: Known | None = None) -> AxisFit:
+    """Fit one axis; samples that no level explains are left out, clocks that surely disagree are set, and the
+    fit is repeated.  ``known``: a torque to take off before."""
+    centre = body.starting_levels(series)
+    levels, offsets, left_out = _most_probable(body, centre, centre, series, known), {}, 0
+    for again in (True, True, False):
+        times, data = arrange(series)
+        data = without_known(body, levels, times, data, known)
+        whitened = np.nan_to_num(smooth(body.smooth_model(levels, times), data).whitened)
+        bad = np.abs(whitened) > OUTLYING
+        outliers = bool(bad.any()) and bad.mean() <= 0.1
+        if outliers:
+            series, left_out = _without(series, times, data, bad), left_out + int(bad.sum())
+        late = {}
+        if not offsets:
+            offsets = _offsets(body, levels, series, known)
+            late = {row: offsets[n].seconds for row, n in enumerate(ROWS) if n in offsets and offsets[n].corrected}
+            series = [s.later(-late.get(s.row, 0.0)) for s in series]
+        if not again or not (outliers or late):
+            break
+        levels = _most_probable(body, centre, levels, series, known)
+    return AxisFit(levels, tuple(series), left_out, offsets)
+
+
+def _most_probable(body: Body, centre: Levels, start: Levels, series, known: Known | None) -> Levels:
+    kind, middle, spread = type(centre), centre.logs(), np.array(body.SPREAD)
+    blocks = [arrange(part) for part in _blocks(series)]
+    blocks = [(times, without_known(body, start, times, data, known)) for times, data in blocks]
+
+    def cost(p):
+        levels = kind.from_logs(p)
+        value = sum(log_likelihood(body.smooth_model(levels, times), data) for times, data in blocks)
+        return (-value if np.isfinite(value) else 1e10) + 0.5 * np.sum(((p - middle) / spread) ** 2)
+
+    bounds = list(zip(middle - 4 * spread, middle + 4 * spread, strict=True))
+    found = optimize.minimize(cost, start.logs(), method="L-BFGS-B", bounds=bounds, options={"maxiter": 60})
+    return kind.from_logs(found.x)
+
+
+def _blocks(series) -> list[list[Series]]:
+    """The whole record, or stretches of equal length spread over a long one."""
+    count = sum(len(s.values) for s in series)
+    if count <= _MOST_FITTED:
+        return [list(series)]
+    first, last = min(s.seconds[0] for s in series), max(s.seconds[-1] for s in series)
+    length = (last - first) * _MOST_FITTED / _BLOCKS / count
+    starts = np.linspace(first, last - length, _BLOCKS)
+    parts = [[s.between(a, a + length) for s in series] for a in starts]
+    return [p for p in parts if all(len(s.values) > 2 for s in p)] or [list(series)]
+
+
+def _offsets(body: Body, levels: Levels, series, known: Known | None) -> dict[str, Offset]:
+    """Each channel against the actuators', by the curvature of the likelihood along the shift; two rounds."""
+    series = _blocks(series)[0]
+    lead = max(series, key=lambda s: s.row)
+    shifts = {s.row: 0.0 for s in series if s is not lead}
+    sigmas: dict[int, float] = {}
+
+    def cost(row: int, shift: float) -> float:
+        moved = [s.later(-(shift if s.row == row else shifts.get(s.row, 0.0))) for s in series]
+        times, data = arrange(moved)
+        data = without_known(body, levels, times, data, known)
+        return -log_likelihood(body.smooth_model(levels, times), data)
+
+    for _ in range(2):
+        for row in shifts:
+            h = 0.1
+            centre = shifts[row]
+            for _ in range(4):  # Newton's steps on a parabola through three points
+                left, here, right = (cost(row, centre + d) for d in (-h, 0.0, h))
+                bend = (left - 2 * here + right) / h**2
+                if not bend > 0:
+                    break
+                step = float(np.clip((left - right) / (2 * h * bend), -0.5, 0.5))
+                centre = float(np.clip(centre + step, -_REACH_S, _REACH_S))
+                sigmas[row] = float(1 / np.sqrt(bend))
+                if abs(step) < 0.02:
+                    break
+            shifts[row] = centre
+    found = {}
+    for row, sigma in sigmas.items():
+        t = shifts[row]
+        sure = abs(t) > _SURE * sigma and abs(t) > _WORTH_S and abs(t) < _REACH_S
+        found[ROWS[row]] = Offset(t, sigma, bool(sure))
+    return found
+
+
+def _without(series, times: Times, data: Measurements, bad) -> list[Series]:
+    step = step_of(data)
+    kept = []
+    for s in series:
+        drop = times.seconds[step[bad & (data.row == s.row)]]
+        keep = ~np.isin(np.round(s.seconds * 1e3), np.round(drop * 1e3))
+        kept.append(replace(s, seconds=s.seconds[keep], values=s.values[keep]))
+    return kept
+
+
+def fit_doubts(axis: str, fit: AxisFit) -> list[str]:
+    """What one axis's fit leaves to doubt."""
+    doubts = []
+    for channel, o in fit.offsets.items():
+        if o.corrected:
+            doubts.append(
+                f"{channel} about {axis} is {abs(o.seconds):.2f} +- {o.sigma:.2f} s {'late' if o.seconds > 0 else 'early'} against "
+                "the actuators' telemetry: its times are shifted by that; check the time stamps"
+            )
+    if fit.left_out:
+        doubts.append(f"{fit.left_out} samples about {axis} lie beyond {OUTLYING:g} sigma and are left out")
+    return doubts
