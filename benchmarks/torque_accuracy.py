@@ -51,7 +51,7 @@ def spiked(telemetry, share: float, seed: int):
     channels = {}
     for name, c in telemetry.channels.items():
         v = c.values.copy()
-        if not name.startswith("quaternion"):
+        if c.kind.stem in ("wheel_rate", "body_rate", "attitude_error"):
             hit = rng.random(len(v)) < share
             v[hit] += 30 * np.std(np.diff(v)) * rng.choice([-1, 1], hit.sum())
         channels[name] = replace(c, values=v)

@@ -162,3 +162,18 @@ def test_law_discretization_is_exact():
         block = np.block([[-F, Qc], [np.zeros((6, 6)), F.T]]) * dt
         E = expm(block)
         assert np.allclose(a, E[6:, 6:].T, rtol=1e-9) and np.allclose(q, E[6:, 6:].T @ E[:6, 6:], rtol=1e-8)
+
+
+def test_law_each_measurement_against_all_the_others():
+    """As found by leaving it out and predicting it."""
+    model, data = problem(2)
+    s = smooth(model, data)
+    step = np.searchsorted(data.start, np.arange(len(data.row)), side="right") - 1
+    for i in (0, 7, len(data.row) - 1):
+        keep = np.arange(len(data.row)) != i
+        start = data.start - (data.start > i)
+        mean, covariance, _ = batch(model, Measurements(start, data.row[keep], data.value[keep]))
+        n, h = len(model.mean), model.H[data.row[i]]
+        at = slice(step[i] * n, (step[i] + 1) * n)
+        sigma = np.sqrt(h @ covariance[at, at] @ h + model.R[data.row[i]])
+        assert s.alone[i] == pytest.approx((data.value[i] - h @ mean[at]) / sigma, rel=1e-8)

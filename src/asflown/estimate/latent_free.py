@@ -18,7 +18,7 @@ import numpy as np
 
 from ..kit.smoother import Measurements, Smoothed
 from .latent import BODY_RATE, CONTROL_TORQUE, MOMENTUM, ROWS, Body, Levels, Times, step_of
-from .latent_loop import white_noise
+from .latent_loop import usual_size, white_noise
 
 _RATE, _STORED, _PUSH, _TORQUE, _STATES = 0, 1, 2, 3, 5
 
@@ -81,7 +81,7 @@ class FreeBody(Body):
         pushed = actuator.row == CONTROL_TORQUE
         push = actuator.values if pushed else np.gradient(actuator.values, actuator.seconds)
         # what the wheels do to hold a body still is what disturbs it: the same size to start from
-        size = max(float(np.std(push)), 1e-12)
+        size = max(usual_size(push), 1e-12)
         return FreeLevels(
             torque_Nm=size,
             length_s=15.0,

@@ -108,13 +108,13 @@ class HeldBody(Body):
 
     def start(self, v: LoopLevels, times: Times) -> np.ndarray:
         turning = 3 * times.largest[BODY_RATE] + 1e-5
-        stored = 10 * v.momentum_white_Nms / self.inertia_kgm2 + turning
+        stored = 3 * times.largest[MOMENTUM] / self.inertia_kgm2 + turning  # the first sample may be a bad one
         return np.array([3 * times.largest[ATTITUDE_ERROR] + 1e-4, *[turning] * 5, stored, v.error_slow_rad])
 
     def starting_levels(self, series) -> LoopLevels:
         by_row = {s.row: s for s in series}
         h = by_row[MOMENTUM]
-        push = max(float(np.std(np.gradient(h.values, h.seconds))), 1e-7)
+        push = max(usual_size(np.gradient(h.values, h.seconds)), 1e-7)
         white = white_noise(by_row[ATTITUDE_ERROR], 1e-9)
         return LoopLevels(
             torque_Nm=push,
@@ -126,6 +126,12 @@ class HeldBody(Body):
             error_time_s=15.0,
             reaction_Nm_sqrt_s=max(0.05 * push, 1e-6),
         )
+
+
+def usual_size(values: np.ndarray) -> float:
+    """Standard deviation, values beyond twice the size that one in five exceeds cut to that (spikes)."""
+    most = 2 * float(np.quantile(np.abs(values), 0.8))
+    return float(np.std(np.clip(values, -most, most)))
 
 
 def white_noise(s: Series, least: float) -> float:

@@ -14,8 +14,10 @@ from scipy import optimize
 from ..kit.smoother import Measurements, log_likelihood, smooth
 from .latent import ROWS, Body, Known, Levels, Series, Times, arrange, step_of, without_known
 
-#: A sample whose innovation is larger than this many sigma is left out. [sigma]
-OUTLYING = 5.0
+#: A sample that all the others contradict by more than this is left out; the most that may be. [sigma]
+OUTLYING, _MOST_OUTLYING = 5.0, 0.1
+#: A bad sample makes its neighbours look bad: of those this close only the worst is left out at a time. [s]
+_NEIGHBOURS_S = 20.0
 #: An offset between channels is corrected when it is this sure, and this large. [sigma], [s]
 _SURE, _WORTH_S = 4.0, 0.2
 #: Furthest offset looked for. [s]
@@ -44,27 +46,49 @@ class AxisFit:
 
 
 def fit_levels(body: Body, series: list[Series], known: Known | None = None) -> AxisFit:
-    """Fit one axis; samples that no level explains are left out, clocks that surely disagree are set, and the
-    fit is repeated.  ``known``: a torque to take off before."""
+    """Fit one axis; samples that all the others contradict are left out, clocks that surely disagree are set, and
+    the fit is repeated.  ``known``: a torque to take off before."""
     centre = body.starting_levels(series)
-    levels, offsets, left_out = _most_probable(body, centre, centre, series, known), {}, 0
-    for again in (True, True, False):
-        times, data = arrange(series)
-        data = without_known(body, levels, times, data, known)
-        whitened = np.nan_to_num(smooth(body.smooth_model(levels, times), data).whitened)
-        bad = np.abs(whitened) > OUTLYING
-        outliers = bool(bad.any()) and bad.mean() <= 0.1
-        if outliers:
-            series, left_out = _without(series, times, data, bad), left_out + int(bad.sum())
-        late = {}
-        if not offsets:
-            offsets = _offsets(body, levels, series, known)
-            late = {row: offsets[n].seconds for row, n in enumerate(ROWS) if n in offsets and offsets[n].corrected}
-            series = [s.later(-late.get(s.row, 0.0)) for s in series]
-        if not again or not (outliers or late):
-            break
+    count = sum(len(s.values) for s in series)
+    # levels not yet fitted: only what no level would explain
+    cleaned = _without_outliers(body, centre, series, known, 2 * OUTLYING)
+    if cleaned is not series:
+        series, centre = cleaned, body.starting_levels(cleaned)
+    levels = _most_probable(body, centre, centre, series, known)
+    cleaned = _without_outliers(body, levels, series, known, OUTLYING)
+    offsets = _offsets(body, levels, cleaned, known)
+    late = {row: offsets[n].seconds for row, n in enumerate(ROWS) if n in offsets and offsets[n].corrected}
+    if late or cleaned is not series:
+        series = [s.later(-late.get(s.row, 0.0)) for s in cleaned]
         levels = _most_probable(body, centre, levels, series, known)
-    return AxisFit(levels, tuple(series), left_out, offsets)
+        series = _without_outliers(body, levels, series, known, OUTLYING)
+    return AxisFit(levels, tuple(series), count - sum(len(s.values) for s in series), offsets)
+
+
+def _without_outliers(body: Body, levels: Levels, series, known: Known | None, limit: float):
+    """The series less what lies beyond ``limit``, worst first; as they are where there is nothing, or too much."""
+    kept, most = series, _MOST_OUTLYING * sum(len(s.values) for s in series)
+    left_out = 0
+    while True:
+        times, data = arrange(kept)
+        data = without_known(body, levels, times, data, known)
+        alone = np.abs(np.nan_to_num(smooth(body.smooth_model(levels, times), data).alone))
+        worst = _worst(alone, times.seconds[step_of(data)], limit)
+        left_out += len(worst)
+        if left_out > most:
+            return series
+        if not len(worst):
+            return kept
+        kept = _without(kept, times, data, worst)
+
+
+def _worst(alone: np.ndarray, at_s: np.ndarray, limit: float) -> np.ndarray:
+    """Measurements beyond the limit, none near a worse one."""
+    chosen: list[int] = []
+    for i in np.flatnonzero(alone > limit)[np.argsort(-alone[alone > limit])]:
+        if all(abs(at_s[i] - at_s[c]) > _NEIGHBOURS_S for c in chosen):
+            chosen.append(int(i))
+    return np.array(chosen, int)
 
 
 def _most_probable(body: Body, centre: Levels, start: Levels, series, known: Known | None) -> Levels:
@@ -130,11 +154,11 @@ def _offsets(body: Body, levels: Levels, series, known: Known | None) -> dict[st
     return found
 
 
-def _without(series, times: Times, data: Measurements, bad) -> list[Series]:
+def _without(series, times: Times, data: Measurements, bad: np.ndarray) -> list[Series]:
     step = step_of(data)
     kept = []
     for s in series:
-        drop = times.seconds[step[bad & (data.row == s.row)]]
+        drop = times.seconds[step[bad[data.row[bad] == s.row]]]
         keep = ~np.isin(np.round(s.seconds * 1e3), np.round(drop * 1e3))
         kept.append(replace(s, seconds=s.seconds[keep], values=s.values[keep]))
     return kept

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy import ndimage
 
 from ..craft.model import Craft, CraftAt, Wheel
 from ..kit.errors import BadInput, some_of
@@ -114,9 +115,9 @@ def _moved(telemetry: Telemetry, craft: Craft) -> str | None:
 
 
 def slews(telemetry: Telemetry) -> bool:
-    """Whether the body's rate changes as it does in a slew, never in a hold."""
+    """Whether the body's rate changes as it does in a slew, never in a hold; single spikes do not count."""
     rates = [telemetry.channel(f"body_rate_{a}").usable.values for a in AXES if f"body_rate_{a}" in telemetry]
-    return any(len(r) and np.ptp(r) > _SWING_OF_A_SLEW for r in rates)
+    return any(len(r) and np.ptp(ndimage.median_filter(r, 5)) > _SWING_OF_A_SLEW for r in rates)
 
 
 def thrusters_firing(telemetry: Telemetry) -> list[str]:

@@ -36,21 +36,23 @@ def disturbance_torque(
     """The torque on the body that the actuators did not command, in body axes. [N m]
 
     ``method``: 'fused' (all channels at once), 'momentum' (000 eqs 2-9), 'transfer' (000 eqs 10-20; ``model``
-    low, hankel or full) or 'polynomial' (004 eqs 7, 17, 18; ``order`` 6, 12, 15 or 18); None: fused, and for
-    the printed variant momentum.  ``variant``: 'corrected', or 'printed', the paper's way with its faults.
+    low, hankel or full) or 'polynomial' (004 eqs 7, 17, 18; ``order`` 6, 12, 15 or 18); None: fused where it can
+    be, else (and for the printed variant, or with a window) momentum.  ``variant``: 'corrected', or 'printed', the paper's way with its faults.
     ``prior``, ``loop``, ``considered``: of the fused method, see ``torque_fused.fused``.  ``window_s``: full width of
     the corrected methods' local fits, in place of the studied one.  ``moving``: see ``subject_of``.
 
     Positive torque turns the body about +axis.  Raises BadInput where the telemetry lacks what the
     method needs, names wheels the craft does not have, or is shorter than the window."""
     _check(variant, VARIANTS, "variant")
-    method = method or ("momentum" if variant == "printed" else "fused")
+    free = method is None and variant == "corrected" and window_s is None
+    method = method or ("fused" if free else "momentum")
     _check(method, METHODS, "method")
     for name, value, allowed in (("prior", prior, torque_fused.PRIORS), ("loop", loop, records.LOOPS)):
         if value is not None:
             _check(value, allowed, name)
     _check_considered(considered)
-    if method != "fused" and (prior or loop or considered):
+    chosen = prior is not None or loop is not None or considered is not None
+    if method != "fused" and chosen:
         raise BadInput(
             f"the {method} method has no prior, loop or considered quantities to choose", remedy="Use --method fused."
         )
@@ -69,8 +71,17 @@ def disturbance_torque(
     if window_s is not None and (variant == "printed" or method in ("polynomial", "fused")):
         raise BadInput(f"the {method} method, {variant}, has no window to choose", remedy="Leave --window out.")
     subject = subject_of(telemetry, craft, moving)
+    beforehand: list[str] = []
     try:
-        answer = _run(subject, method, variant, axis, model, order, window_s, (prior, loop, considered))
+        try:
+            answer = _run(subject, method, variant, axis, model, order, window_s, (prior, loop, considered))
+        except BadInput as why:
+            if not free or chosen:
+                raise
+            method = "momentum"  # what asks for less; where it too is asked too much, its complaint is the plainer one
+            answer = _run(subject, method, variant, axis, model, order, window_s, (prior, loop, considered))
+            where = f"{why.channel}: " if why.channel else ""
+            beforehand.append(f"the fused method cannot be used ({where}{why.what}): this is the momentum method")
     except BadInput as why:
         raise why.within(telemetry.source) from why.__cause__
     grid, torque, sigma, momentum, settings, doubts, fits, *paths = answer
@@ -94,7 +105,7 @@ def disturbance_torque(
         fits=tuple(fits),
         paths_Nm=paths[0] if paths else None,
     )
-    doubts = [*subject.doubts, *doubts, *_thruster_doubts(subject), *_relative_doubts(subject, result)]
+    doubts = [*beforehand, *subject.doubts, *doubts, *_thruster_doubts(subject), *_relative_doubts(subject, result)]
     if method == "momentum" and variant == "corrected":
         doubts += _smoothing_doubts(result, settings["half_width_s"])
     ready = {method: answer} if variant == "corrected" and sigma is not None else {}

@@ -101,12 +101,14 @@ def log_likelihood(model: Model, data: Measurements) -> float:
 class Smoothed:
     """Mean (N, n) given all measurements; innovations over their sigma (M,).
 
+    ``alone``: (M,), what each measurement differs by from what all the others say of it, over its sigma.
     Covariances that repeat are held once: that of step k is ``matrices[case[k]]``."""
 
     mean: np.ndarray
     matrices: np.ndarray
     case: np.ndarray
     whitened: np.ndarray
+    alone: np.ndarray
     log_likelihood: float
 
     @property
@@ -123,10 +125,10 @@ def smooth(model: Model, data: Measurements) -> Smoothed:
     arrays = _arrays(model, data)
     ll, mean, covariances, innovation, variance, product, origin = _filter(*arrays, True)
     A, _, _, _, which, H, _, _, _, start, row, _, period, _ = arrays
-    case = _backward(A, which, H, start, row, period, mean, covariances, innovation, variance, product, origin)
+    case, alone = _backward(A, which, H, start, row, period, mean, covariances, innovation, variance, product, origin)
     # a variance that rounding drove below zero (values of absurd size) shows as NaN, without noise
     whitened = innovation / np.sqrt(np.where(variance > 0, variance, np.nan))
-    return Smoothed(mean, covariances, case, whitened, float(ll))
+    return Smoothed(mean, covariances, case, whitened, alone, float(ll))
 
 
 def _arrays(model: Model, data: Measurements):
@@ -300,10 +302,11 @@ def _take_in(P, h, noise, Ph):
 def _backward(A, which, H, start, row, period, mean, covariances, innovation, variance, product, origin):
     """Smooth the filtered means in place; lay smoothed covariances beside or over the filtered ones.
 
-    Returns where that of each step lies.  A step that repeats another's has its own place free, and no step
+    Returns where that of each step lies, and each measurement against all the others (de Jong's u / sqrt D).  A step that repeats another's has its own place free, and no step
     reads the place of a later one that did not."""
     steps, n = mean.shape
     case, phases = np.empty(steps, np.int64), max(period, 1)
+    alone, weight = np.empty(len(row)), np.empty(len(row))  # weight: D, the inverse of the variance given all others
     past = np.zeros((phases, n, n))  # information from beyond each of the next period's steps
     adjoint, line, N = np.zeros(n), np.empty(n), np.zeros((n, n))
     turned, work, back = np.empty((n, n)), np.empty((n, n)), np.empty(A.shape)
@@ -337,20 +340,23 @@ def _backward(A, which, H, start, row, period, mean, covariances, innovation, va
             u /= variance[i]
             for r in range(n):
                 adjoint[r] -= H[h, r] * u
-            if not again:
-                _give_back(N, H[h], product[own], variance[i], line)
+            if again:
+                weight[i] = weight[start[k + period] + i - start[k]]
+            else:
+                weight[i] = _give_back(N, H[h], product[own], variance[i], line)
+            alone[i] = u / np.sqrt(weight[i])
         if k > 0:
             _apply(back[which[k]], adjoint, line)
             if not again:
                 _sandwich(back[which[k]], N, turned, work)
                 N, turned = turned, N
                 settled = 0 < period <= steps - k and _same_matrix(N, past[(k - 1) % phases])
-    return case
+    return case, alone
 
 
 @jit
 def _give_back(N, h, Ph, S, KN):
-    """N = (1 - K h)^T N (1 - K h) + h^T h / S in place, with K = P h^T / S."""
+    """N = (1 - K h)^T N (1 - K h) + h^T h / S in place, with K = P h^T / S; returns 1 / S + K^T N K as it was."""
     n = len(N)
     for c in range(n):
         KN[c] = 0.0
@@ -368,3 +374,4 @@ def _give_back(N, h, Ph, S, KN):
                 change = h[r] * (h[c] * half - KN[c])
                 N[r, c] += change
                 N[c, r] += change
+    return 2 * half
