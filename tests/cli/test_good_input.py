@@ -46,6 +46,7 @@ def finite(values) -> np.ndarray:
             ("transfer", "corrected"),
             ("transfer", "printed"),
             ("polynomial", "corrected"),
+            ("fused", "corrected"),
         )
     ],
 )
@@ -58,7 +59,8 @@ def test_one_json_object_with_the_promised_keys(options, good):
     torque_y = finite(record["torque_Nm"])
     assert torque_y.shape == finite(record["time_s"]).shape and np.isfinite(torque_y).all()
     assert record["sigma_Nm"] is None or finite(record["sigma_Nm"]).shape == torque_y.shape
-    assert all(set(p) == {"time_s", "torque_Nm"} for p in record["peaks"])
+    with_sigma = {"sigma_Nm"} if options[1] == "fused" else set()
+    assert all(set(p) == {"time_s", "torque_Nm"} | with_sigma for p in record["peaks"])
     largest = max(record["peaks"], key=lambda p: abs(p["torque_Nm"]))
     assert largest["torque_Nm"] > 0 and abs(largest["time_s"] - 240) < 10  # s
     assert all(isinstance(d, str) for d in record["doubts"])
@@ -146,11 +148,12 @@ def test_short_runs_are_bridged_and_long_gaps_are_null_and_reported(tmp_path):
         if name != "time [s]":
             bridged[name][30:35] = np.nan
             broken[name][30:38] = np.nan  # 120 s to 148 s
-    assert np.isfinite(finite(torque(written(tmp_path, csv_text(bridged), "a.csv"))["torque_Nm"])).all()
+    path = written(tmp_path, csv_text(bridged), "a.csv")
+    assert np.isfinite(finite(torque(path, "--method", "momentum")["torque_Nm"])).all()
     path = written(tmp_path, csv_text(broken), "b.csv")
     rows_left_out = {k: np.delete(v, slice(30, 38)) for k, v in flight().items()}
     other = written(tmp_path, csv_text(rows_left_out), "c.csv")
-    for options in ([], ["--variant", "printed"], ["--method", "transfer"], ["--method", "transfer", "--variant", "printed"],
+    for options in (["--method", "momentum"], ["--variant", "printed"], ["--method", "transfer"], ["--method", "transfer", "--variant", "printed"],
                     ["--method", "polynomial"]):  # fmt: skip
         record = torque(path, "--axis", "y", *options)
         time_s, values = finite(record["time_s"]), finite(record["torque_Nm"])

@@ -8,29 +8,64 @@ import pytest
 
 from asflown import disturbance_torque, fly, load_craft, load_telemetry
 from asflown.estimate.compare import best_lag
-from asflown.estimate.latent_loop import CHANNELS, Body, Levels, Series, arrange
+from asflown.estimate.corners import draw_torques
+from asflown.estimate.curves import gaussian_torque
+from asflown.estimate.latent import Series, arrange, response
+from asflown.estimate.latent_free import FreeBody, FreeLevels
+from asflown.estimate.latent_loop import HeldBody, LoopLevels
+from asflown.estimate.levels import fit_levels
+from asflown.estimate.result import spread
 from asflown.estimate.truth import against_truth
 from asflown.kit.errors import BadInput
+from asflown.kit.smoother import smooth
 from conftest import flight_data
 
 CASSINI = load_craft("cassini")
+BODY = HeldBody.under(CASSINI.wheel_controller, 5226.0)
+LEVELS = LoopLevels(0.01, 15, 2e-6, 1e-3, 5e-6, 8e-6, 15, 3e-4)
 
 
 def fused(telemetry, craft=CASSINI, **how):
-    return disturbance_torque(telemetry, craft, method="fused", **{"axis": "y", **how})
+    return disturbance_torque(telemetry, craft, **{"axis": "y", "method": "fused", **how})
 
 
-def coverage(result, truth, sigmas=1.96):
-    error = result.torque_Nm[:, 1] - np.interp(result.time_s, truth.time_s, truth.torque_Nm[:, 1])
-    return np.mean(np.abs(error) < sigmas * result.sigma_Nm[:, 1]), float(np.sqrt(np.mean(error**2)))
+def coverage(result, truth, share=0.95):
+    true = np.interp(result.time_s, truth.time_s, truth.torque_Nm[:, 1])
+    low, high = result.band(share)
+    inside = (low[:, 1] <= true) & (true <= high[:, 1])
+    return np.mean(inside), float(np.sqrt(np.mean((result.torque_Nm[:, 1] - true) ** 2)))
+
+
+def drawn_from_the_model(body, levels, rows, seed, seconds=480):
+    """Series and torque drawn from a body's own Gaussian model: what its bounds are bounds of."""
+    rng = np.random.default_rng(seed)
+    empty = [Series(r, np.arange(0, seconds + 0.1, step), np.ones(int(seconds / step) + 1)) for r, step in rows]
+    times, data = arrange(empty, np.arange(seconds + 1.0))
+    model = body.smooth_model(levels, times)
+
+    def root(q):
+        w, V = np.linalg.eigh(q)
+        return V * np.sqrt(np.maximum(w, 0))
+
+    roots = [root(q + model.scale[0, 0] * d) for q, d in zip(model.Q, model.driven[0], strict=True)]
+    x, torque, value = root(model.covariance) @ rng.standard_normal(body.STATES), [], np.empty(len(data.row))
+    for k in range(len(times.seconds)):
+        if k:
+            x = model.A[model.which[k]] @ x + roots[model.which[k]] @ rng.standard_normal(body.STATES)
+        for i in range(data.start[k], data.start[k + 1]):
+            value[i] = model.H[data.row[i]] @ x + np.sqrt(model.R[data.row[i]]) * rng.standard_normal()
+        torque.append(body.inertia_kgm2 * x[body.torque])
+    step = np.searchsorted(data.start, np.arange(len(value)), side="right") - 1
+    series = [Series(r, times.seconds[step[data.row == r]], value[data.row == r]) for r, _ in rows]
+    return series, times, replace(data, value=value), np.array(torque), model
 
 
 def test_law_one_axis_model_is_the_loop_of_the_papers():
     """The transfer function torque -> attitude error of the state space is 000 eq 11, worked out in dynamics."""
     from asflown.dynamics.loop import error_per_torque
 
-    levels = Levels(0.01, 15, 5e-6, 2e-6, 1e-3, 8e-6, 15, 1e-3)
-    F, _, _ = Body(5226.0, CASSINI.wheel_controller).dynamics(levels, edges=True)
+    F, _ = BODY.dynamics(LEVELS)
+    F[1, 8] = 1
     loop = [0, 1, 2, 3, 4, 5]
     A, b = F[np.ix_(loop, loop)], F[loop, 8] / 5226.0  # torque enters per unit inertia
     num, den = error_per_torque(CASSINI.wheel_controller, 5226.0)
@@ -40,13 +75,52 @@ def test_law_one_axis_model_is_the_loop_of_the_papers():
         assert -attitude == pytest.approx(np.polyval(num, s) / np.polyval(den, s), rel=1e-9)
 
 
+def test_law_a_delay_turns_the_phase_of_what_the_wheels_do():
+    """To first order: the loop's answer with a delay of 0.1 s is that with exp(-0.1 s) in the controller."""
+    k = CASSINI.wheel_controller
+    F, _ = replace(BODY, delay_s=0.1).dynamics(LEVELS)
+    f = k.rate_filter
+    for hertz in (1 / 120, 1 / 60, 0.03):
+        s = 2j * np.pi * hertz
+        lowpass = (
+            f.natural_frequency**2 / (s**2 + 2 * f.damping * f.natural_frequency * s + f.natural_frequency**2)
+        ) ** 2
+        late = k.kd_per_s * (k.kp_per_s + lowpass * s) * np.exp(-0.1 * s)
+        attitude = np.linalg.solve(s * np.eye(6) - F[:6, :6], np.eye(6)[1])[0]
+        effect = abs((s**2 + late * np.exp(0.1 * s)) / (s**2 + late) - 1)
+        assert abs(attitude * (s**2 + late) - 1) < 0.1 * effect
+
+
 def test_law_total_momentum_feels_only_the_torque():
-    """In the model d(I rate + h)/dt = T, whatever the wheels do beside their command."""
-    levels = Levels(0.01, 15, 5e-6, 2e-6, 1e-3, 8e-6, 15, 1e-3)
-    F, Q, _ = Body(5226.0, CASSINI.wheel_controller).dynamics(levels, edges=False)
-    total = np.zeros(10)
-    total[[1, 6]] = 1
-    assert np.allclose(total @ F, np.eye(10)[8]) and np.allclose(total @ Q, 0)
+    """In the models d(I rate + h)/dt = T, whatever the wheels do beside their command."""
+    for body, levels in ((BODY, LEVELS), (FreeBody(inertia_kgm2=5226.0), FreeLevels(0.01, 15, 2e-6, 1e-3, 0.01, 2))):
+        F, Q = body.dynamics(levels)
+        F[body.torque, body.slope] = 1
+        if isinstance(body, HeldBody):
+            F[body.RATE, body.torque] = 1
+        total = np.zeros(body.STATES)
+        total[[body.RATE, body.STORED]] = 1
+        assert np.allclose(total @ F, np.eye(body.STATES)[body.torque]) and np.allclose(total @ Q, 0)
+
+
+def test_law_sensitivities_are_what_other_numbers_would_measure():
+    """Flown with 1 % more inertia or spin inertia, the measurements change by a hundredth of the column."""
+    t = np.arange(0, 481.0)
+    torque = 0.02 * np.sin(2 * np.pi * t / 80) * (t > 60) * (t < 380)
+    rows = [(0, 2), (1, 4), (2, 4)]
+    series, times, data, _, _ = drawn_from_the_model(BODY, LEVELS, rows, 0)
+    clean = response(BODY, LEVELS, times, data, torque)
+    tight = replace(LEVELS, rate_white_rad_s=1e-9, momentum_white_Nms=1e-6, error_white_rad=1e-9, error_slow_rad=1e-9)
+    best = smooth(BODY.smooth_model(tight, times), replace(data, value=clean))
+    found = BODY.sensitivities(tight, times, data, best)
+    heavier = response(replace(BODY, inertia_kgm2=1.01 * 5226.0), tight, times, data, torque)
+    for row in (0, 1):  # the wheels take up the same momentum
+        here = data.row == row
+        size = np.abs(heavier - clean)[here].max()
+        assert np.allclose(0.01 * found["inertia"][here], (heavier - clean)[here], atol=0.03 * size)
+    stored = data.row == 2
+    assert np.allclose(found["spin_inertia"][stored], clean[stored], atol=0.02 * np.abs(clean[stored]).max())
+    assert not found["spin_inertia"][~stored].any() and not found["inertia"][stored].any()
 
 
 def test_series_of_different_times_merge_into_one_pass():
@@ -58,12 +132,26 @@ def test_series_of_different_times_merge_into_one_pass():
     assert times.seconds.tolist() == [0, 1, 2, 3, 4] and times.wanted.tolist() == [False, True, True, True, False]
     assert data.start.tolist() == [0, 2, 2, 3, 3, 5]
     assert sorted(zip(data.row.tolist(), data.value.tolist(), strict=True)) == [(0, 1), (0, 2), (0, 3), (2, 7), (2, 8)]
-    assert len(CHANNELS) == 3
+
+
+@pytest.mark.parametrize("prior", ["matern", "edges"])
+def test_law_near_the_bound_for_torques_drawn_from_the_prior(prior):
+    """Within 1.15 of the posterior Cramer-Rao bound of the known linear Gaussian model, levels fitted, not told."""
+    bound, found = [], []
+    for seed in range(6):
+        series, times, data, torque, model = drawn_from_the_model(BODY, LEVELS, [(0, 2), (1, 4), (2, 4)], seed)
+        bound.append(BODY.inertia_kgm2**2 * smooth(model, data).covariance[:, BODY.torque, BODY.torque].mean())
+        fit = fit_levels(BODY, series)
+        times, data = arrange(fit.series, np.arange(481.0))
+        solve = gaussian_torque if prior == "matern" else draw_torques
+        post = solve(BODY, fit.levels, times, data, np.empty((len(data.row), 0)), 200, np.random.default_rng(seed))
+        found.append(np.mean((post.mean[times.wanted] - torque) ** 2))
+    assert np.sqrt(np.mean(found) / np.mean(bound)) < 1.15
 
 
 @pytest.mark.parametrize("profile", ["profile-1", "profile-2"])
 def test_recovery_fused_beats_both_printed_methods_and_its_band_holds(profile):
-    """Nominal noise, four seeds: RMS at most a third of printed momentum, half of printed transfer; 95 % band."""
+    """Nominal noise, four seeds: RMS at most a quarter of printed momentum, 1/2.4 of printed transfer; 95 % band."""
     ours, momentum, transfer, held, lags = [], [], [], [], []
     for seed in range(4):
         flight = fly(profile, seed=seed)
@@ -78,12 +166,12 @@ def test_recovery_fused_beats_both_printed_methods_and_its_band_holds(profile):
             p = disturbance_torque(flight.telemetry, CASSINI, method=method, variant="printed", axis="y")
             to.append(against_truth(p, *truth, peaks, "y").rms_Nm)
     ratio = np.exp(np.mean(np.log(np.array([momentum, transfer]) / ours), axis=1))
-    assert ratio[0] > 3 and ratio[1] > 2
-    assert 0.92 < np.mean(held) <= 1
+    assert ratio[0] > 4 and ratio[1] > 2.4
+    assert 0.9 < np.mean(held) <= 1
     assert abs(np.mean(lags)) < 0.3  # s
 
 
-@pytest.mark.parametrize("run", ["torque1", "torque2"])
+@pytest.mark.parametrize("run", ["torque1", "torque2", "torque1_flex", "cover"])
 def test_recovery_fused_on_another_simulator(run):
     tlm = load_telemetry(flight_data(f"simulated/{run}.csv.gz"))
     profile = json.loads(flight_data(f"simulated/{run}.json").read_text())["torque_profile"]
@@ -93,8 +181,9 @@ def test_recovery_fused_on_another_simulator(run):
     true = np.interp(r.time_s, profile["t_s"], profile["torque_Nm"])
     error = r.torque_Nm[:, 1] - true
     printed = p.torque_Nm[:, 1] - np.interp(p.time_s, profile["t_s"], profile["torque_Nm"])
-    assert np.sqrt(np.mean(error**2)) < np.sqrt(np.mean(printed**2)) / 3
-    assert np.mean(np.abs(error) < 1.96 * r.sigma_Nm[:, 1]) > 0.92
+    assert np.sqrt(np.mean(error**2)) < np.sqrt(np.mean(printed**2)) / 4
+    low, high = r.band(0.95)
+    assert np.mean((low[:, 1] <= true) & (true <= high[:, 1])) > 0.9
 
 
 def test_recovery_impulse_has_a_sigma_that_holds():
@@ -123,6 +212,7 @@ def test_a_gap_is_bridged_with_a_wider_band():
 
 
 def test_spikes_are_left_out_and_counted():
+    """One in a hundred samples of every channel, also the first one, moved by thirty usual steps."""
     flight = fly("profile-1", seed=3)
     tlm, rng = flight.telemetry, np.random.default_rng(0)
     channels = {}
@@ -130,12 +220,13 @@ def test_spikes_are_left_out_and_counted():
         v = c.values.copy()
         if not n.startswith("quaternion"):
             hit = rng.random(len(v)) < 0.01
+            hit[0] = n == "wheel_rate_RWA1"
             v[hit] += 30 * np.std(np.diff(v)) * rng.choice([-1, 1], hit.sum())
         channels[n] = replace(c, values=v)
     r = fused(replace(tlm, channels=channels))
     assert r.settings["left_out"]["y"] >= 2 and any("left out" in d for d in r.doubts)
     inside, rms = coverage(r, flight.truth)
-    assert inside > 0.9 and rms < 1e-3
+    assert inside > 0.9 and rms < 4e-4
 
 
 def test_same_input_gives_the_same_answer():
@@ -144,21 +235,148 @@ def test_same_input_gives_the_same_answer():
     assert np.array_equal(a.torque_Nm[:, 1], b.torque_Nm[:, 1])
 
 
-def test_missing_channels_and_the_printed_variant_are_refused():
+def test_the_spread_of_normal_samples_is_their_sigma():
+    samples = np.random.default_rng(0).normal(size=(200_000, 2)) * [1, 3]
+    assert spread(samples) == pytest.approx([1, 3], rel=0.01)
+
+
+def test_recovery_gyroscopic_torque_is_taken_off():
+    """The craft turns about z with momentum in its wheels: w x h is 1 mN m about x and y and none of it a disturbance."""
+    flight = fly("quiet", seed=1, wheel_rates={"RWA1": "900 rpm", "RWA2": "-900 rpm"}, torques=[
+        {"shape": "constant", "torque": "0 0.004 0 N m"}])  # fmt: skip
+    r = fused(flight.telemetry, axis="all")
+    inner = (r.time_s > 60) & (r.time_s < 420)
+    assert np.mean(r.torque_Nm[inner, 1]) == pytest.approx(0.004, abs=3e-4)
+    one = fused(flight.telemetry, axis="y")
+    assert np.array_equal(one.torque_Nm[:, 1], r.torque_Nm[:, 1])
+
+
+def test_recovery_with_the_controller_unknown():
+    """Wheels and rates alone: what the wheels do is measured.  The band holds; the attitude error's part is missed."""
+    flight = fly("profile-1", seed=2)
+    tlm = flight.telemetry
+    channels = {n: c for n, c in tlm.channels.items() if not n.startswith("attitude_error")}
+    r = fused(replace(tlm, channels=channels))
+    assert r.settings["loop"] == "measured" and any("taken as measured" in d for d in r.doubts)
+    inside, rms = coverage(r, flight.truth)
+    assert inside > 0.9 and rms < 9e-4  # printed momentum: 1.4e-3
+
+
+def test_recovery_from_control_torque_alone():
+    """Commands and rates, as where gyroscopes hold a station."""
+    flight = fly("profile-1", seed=2, telemetry={"control_torque": "1 s", "wheel_rate": "0 s"})
+    r = fused(flight.telemetry)
+    assert r.settings["loop"] == "measured" and "control_torque" in r.settings["considered"]["y"]
+    inside, rms = coverage(r, flight.truth)
+    assert inside > 0.85 and rms < 1e-3
+
+
+def test_recovery_a_clock_that_is_late_is_found_and_set():
+    flight = fly("profile-2", seed=4)
+    tlm = flight.telemetry
+    late = {
+        n: replace(c, tai_ns=c.tai_ns + 1_500_000_000) if n.startswith("attitude_error") else c
+        for n, c in tlm.channels.items()
+    }
+    r = fused(replace(tlm, channels=late))
+    offset = r.settings["time_offsets"]["y"]["attitude_error"]
+    assert offset["corrected"] and offset["seconds"] == pytest.approx(1.5, abs=0.4)
+    assert any("its times are shifted" in d for d in r.doubts)
+    assert coverage(r, flight.truth)[1] < 6e-4
+
+
+def test_recovery_a_wrong_inertia_is_noticed():
+    """10 % off: the data say so, and the answer does not follow it."""
+    flight = fly("profile-1", seed=1, noise="half")
+    wrong = load_craft("cassini", inertia=(6510, 0.9 * 5333, 3519, -125, -39, 133))
+    r = fused(flight.telemetry, wrong)
+    assert any("want inertia" in d or "not used" in d for d in r.doubts)
+    assert coverage(r, flight.truth)[1] < 5e-4
+
+
+def test_a_loop_that_does_not_explain_the_data_is_not_used():
+    """Attitude error of another craft: nothing in the loop as described could make it."""
+    flight, other = fly("profile-1", seed=1), fly("profile-2", seed=5)
+    mixed = {
+        n: other.telemetry.channel(n) if n.startswith("attitude_error") else c
+        for n, c in flight.telemetry.channels.items()
+    }
+    r = fused(replace(flight.telemetry, channels=mixed))
+    assert r.settings["loop"] == "measured" and any("is not used" in d for d in r.doubts)
+    assert coverage(r, flight.truth)[1] < 6e-4
+    with_it = fused(replace(flight.telemetry, channels=mixed), loop="modelled")
+    assert any("does not explain" in d for d in with_it.doubts)
+
+
+def test_wheels_read_at_instants_of_their_own():
+    """The model carries each wheel's samples to common instants."""
+    flight = fly("profile-2", seed=1, telemetry={"wheel_rate": "1 s"})
+    tlm = flight.telemetry
+    phases = {"wheel_rate_RWA1": 0, "wheel_rate_RWA2": 1, "wheel_rate_RWA4": 3}
+    channels = {n: c.where(slice(phases[n], None, 4)) if n in phases else c for n, c in tlm.channels.items()}
+    r = fused(replace(tlm, channels=channels))
+    assert any("carries their rates" in d for d in r.doubts)
+    inside, rms = coverage(r, flight.truth)
+    assert inside > 0.9 and rms < 5e-4
+
+
+def test_priors_and_considered_quantities_can_be_chosen():
+    flight = fly("profile-1", seed=1)
+    sigma = {}
+    for prior in ("edges", "matern", "wiener"):
+        r = fused(flight.telemetry, prior=prior)
+        assert r.settings["prior"] == prior
+        sigma[prior] = np.median(r.sigma_Nm[:, 1])
+        assert coverage(r, flight.truth)[0] > 0.9
+    assert sigma["edges"] < sigma["matern"]
+    exact = fused(flight.telemetry, considered=dict.fromkeys(("inertia", "spin_inertia", "kp", "kd", "delay_s"), 0.0))
+    vague = fused(flight.telemetry, considered={"inertia": 0.1, "spin_inertia": 0.05})
+    assert not exact.settings["considered"]["y"]
+    assert vague.sigma_Nm[:, 1].mean() > 1.2 * exact.sigma_Nm[:, 1].mean()
+    for how in ({"prior": "magic"}, {"loop": "open"}, {"considered": {"mass": 0.1}}, {"considered": {"kp": -1.0}},
+                {"method": "momentum", "prior": "edges"}):  # fmt: skip
+        with pytest.raises(BadInput):
+            fused(flight.telemetry, **how)
+
+
+def test_a_peak_has_a_sigma_that_holds():
+    pulls = []
+    for seed in range(4):
+        flight = fly("profile-2", seed=seed)
+        r = fused(flight.telemetry)
+        for t, v, _ in flight.truth.peaks:
+            height, sigma = r.peak_height(t, 8.0, "y")
+            pulls.append((height - v) / sigma)
+            assert sigma < 0.06 * abs(v)
+    assert np.abs(pulls).max() < 4 and abs(np.mean(np.array(pulls) * np.tile([1, -1], 12))) < 1
+
+
+def test_the_default_falls_back_to_momentum_where_fused_cannot_be_used():
     tlm = fly("profile-1", seed=1).telemetry
-    with pytest.raises(BadInput, match="in no paper"):
-        fused(tlm, variant="printed")
-    without = replace(tlm, channels={n: c for n, c in tlm.channels.items() if not n.startswith("attitude_error")})
-    with pytest.raises(BadInput, match="attitude_error_y"):
-        fused(without)
+    wheels = replace(tlm, channels={n: c for n, c in tlm.channels.items() if n.startswith("wheel_rate")})
+    r = disturbance_torque(wheels, CASSINI, axis="y")
+    assert r.method == "momentum" and "the fused method cannot be used (body_rate_y" in r.doubts[0]
+    with pytest.raises(BadInput, match="body_rate"):
+        fused(wheels)
+    assert disturbance_torque(tlm, CASSINI, axis="y", window_s=40).method == "momentum"
+    assert disturbance_torque(tlm, CASSINI, axis="y", variant="printed").method == "momentum"
 
 
-def test_a_slew_a_silent_channel_and_a_short_record_are_refused():
+def test_recovery_in_a_slew_the_actuators_are_taken_as_measured():
+    flight = fly("slews", seed=1)
+    r = fused(flight.telemetry, axis="all")
+    assert r.settings["loop"] == "measured" and any("slews" in d for d in r.doubts)
+    assert np.sqrt(np.mean(r.torque_Nm**2)) < 3e-3  # N m; the wheels pass hundreds of times that
     with pytest.raises(BadInput, match="slews"):
-        fused(fly("slews", seed=1).telemetry)
+        fused(flight.telemetry, loop="modelled")
+
+
+def test_a_silent_channel_a_short_record_and_the_printed_variant_are_refused():
     tlm = fly("profile-1", seed=1).telemetry
     c = tlm.channel("attitude_error_y")
     with pytest.raises(BadInput, match="never changes"):
         fused(replace(tlm, channels=tlm.channels | {c.name: replace(c, values=0 * c.values)}))
     with pytest.raises(BadInput, match="fewer than 25"):
         fused(tlm.between(0, 60))
+    with pytest.raises(BadInput, match="in no paper"):
+        fused(tlm, variant="printed")

@@ -130,11 +130,11 @@ def test_five_missing_samples_are_bridged_with_a_wider_band_and_six_are_null():
         channels = {
             n: c.where(~((c.tai_ns >= x[0].start_ns) & (c.tai_ns <= x[0].stop_ns))) for n, c in tlm.channels.items()
         }
-        return disturbance_torque(replace(tlm, channels=channels), CASSINI, axis="y")
+        return disturbance_torque(replace(tlm, channels=channels), CASSINI, axis="y", method="momentum")
 
     bridged, broken = without(5), without(6)
     assert np.isfinite(bridged.torque_Nm[:, 1]).all()
-    whole = disturbance_torque(tlm, CASSINI, axis="y")
+    whole = disturbance_torque(tlm, CASSINI, axis="y", method="momentum")
     hole = (bridged.time_s > 202) & (bridged.time_s < 214)
     assert np.all(bridged.sigma_Nm[hole, 1] > 1.05 * whole.sigma_Nm[hole, 1])
     unknown = broken.time_s[~np.isfinite(broken.torque_Nm[:, 1])]
@@ -158,7 +158,7 @@ def test_the_coarsest_channel_widens_the_window_of_all():
     """Body rates every 12 s: a window of its own for them would make torques of what wheels and body exchange."""
     tlm, *_ = LINEAR[1]
     coarse = {n: c.where(slice(None, None, 3)) if n.startswith("body_rate") else c for n, c in tlm.channels.items()}
-    r = disturbance_torque(replace(tlm, channels=coarse), CASSINI, axis="y")
+    r = disturbance_torque(replace(tlm, channels=coarse), CASSINI, axis="y", method="momentum")
     assert r.settings["half_width_s"] == pytest.approx(30.0)
     assert disturbance_torque(tlm, CASSINI, axis="y", window_s=4.0).settings["half_width_s"] == pytest.approx(10.0)
 
@@ -204,7 +204,7 @@ def test_recovery_on_another_simulator(run, momentum_percent, transfer_percent):
     for m, (low, high) in (("momentum", momentum_percent), ("transfer", transfer_percent)):
         assert low < min(e[m].peak_error_percent) and max(e[m].peak_error_percent) < high, m
     assert 1 <= e["momentum"].peak_lag_s <= 3 and abs(e["transfer"].lag_s) < 1
-    corrected = disturbance_torque(tlm, craft, axis="y")
+    corrected = disturbance_torque(tlm, craft, axis="y", method="momentum")
     assert against_truth(corrected, *true, peaks, "y").rms_Nm < e["momentum"].rms_Nm
     assert any("rounds sharp peaks" in d for d in corrected.doubts)
 

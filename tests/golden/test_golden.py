@@ -11,7 +11,8 @@ from cli.program import csv_text, flight, run
 HERE = Path(__file__).parent
 
 TEXTS = {
-    "torque": ["torque", "t.csv", "--axis", "y"],
+    "torque": ["torque", "t.csv", "--axis", "y", "--prior", "matern"],
+    "torque-momentum": ["torque", "t.csv", "--axis", "y", "--method", "momentum"],
     "torque-printed": ["torque", "t.csv", "--axis", "y", "--variant", "printed"],
     "telemetry-check": ["telemetry", "check", "t.csv"],
     "craft-show-cassini": ["craft", "show", "cassini", "--at", "2005-02-09"],

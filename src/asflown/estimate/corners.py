@@ -27,9 +27,9 @@ from .latent import Body, Levels, Posterior, Times, response
 
 #: Sizes of the roughness as shares of the torque's own size near that time (studies/corners.py).
 ROUGHNESS = (0.05, 0.15, 0.45)
-#: What is given beforehand: a torque of pure lines has as much as all others together, which are the rough
-#: ones and, last, the smooth torque of the fitted levels.
-_PRIOR = (0.5, 0.125, 0.125, 0.125, 0.125)
+#: What is given beforehand: a quarter to a torque of pure lines, as test torques are and mechanisms seldom; most to
+#: middling roughness; the last to the smooth torque of the fitted levels (studies/corners.py).
+_PRIOR = (0.25, 0.1, 0.275, 0.275, 0.1)
 #: Time scale of the roughness, short of what the telemetry resolves; and of what "thereabouts" means. [s]
 ROUGH_LENGTH_S, _NEARBY_S = 4.0, 10.0
 #: Degrees of freedom of the bends: Cauchy, so that one sharp corner does not widen all others.

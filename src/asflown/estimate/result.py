@@ -35,8 +35,10 @@ class Peak:
     sigma_Nm: float | None = None
 
     def record(self, with_axis: bool) -> dict:
-        record: dict = {"time_s": self.time_s, "torque_Nm": self.torque_Nm, "sigma_Nm": self.sigma_Nm}
-        return record | {"axis": self.axis} if with_axis else record
+        record: dict = {"time_s": self.time_s, "torque_Nm": self.torque_Nm}
+        if self.sigma_Nm is not None:
+            record["sigma_Nm"] = self.sigma_Nm
+        return record | ({"axis": self.axis} if with_axis else {})
 
 
 @dataclass(frozen=True)
@@ -193,7 +195,8 @@ class TorqueResult:
                 record[n.replace("_Nm", "_per_spin_inertia_rad_s2")], record[n] = record[n], None
             for p in peaks:
                 p["torque_per_spin_inertia_rad_s2"], p["torque_Nm"] = p["torque_Nm"], None
-                p["sigma_per_spin_inertia_rad_s2"], p["sigma_Nm"] = p["sigma_Nm"], None
+                if "sigma_Nm" in p:
+                    p["sigma_per_spin_inertia_rad_s2"], p["sigma_Nm"] = p["sigma_Nm"], None
             for i in impulses:
                 i["impulse_per_spin_inertia_rad_s"], i["impulse_Nms"] = i["impulse_Nms"], None
                 i["sigma_per_spin_inertia_rad_s"], i["sigma_Nms"] = i["sigma_Nms"], None

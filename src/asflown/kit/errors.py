@@ -39,6 +39,9 @@ class BadInput(ValueError):
             head = head[: room - 1] + "…"
         super().__init__(f"{head}\n{remedy}")
 
+    def __reduce__(self):
+        return _again, (self.what, self.remedy, self.file, self.channel, self.time, self.line)
+
     def within(self, file: object) -> BadInput:
         """The same complaint, with the file it is about where none is named yet."""
         if self.file is not None or not file:
@@ -52,3 +55,8 @@ def some_of(names, most: int = 12) -> str:
     if len(names) <= most:
         return ", ".join(names) if names else "none"
     return ", ".join(names[:most]) + f" and {len(names) - most} more"
+
+
+def _again(what, remedy, file, channel, time, line) -> BadInput:
+    """A BadInput that came from another process."""
+    return BadInput(what, remedy=remedy, file=file, channel=channel, time=time, line=line)
