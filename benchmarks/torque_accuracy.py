@@ -230,7 +230,7 @@ def main() -> None:
     ask = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     ask.add_argument("--runs", type=int, help="flights of every condition, in place of 200 and 40")
     ask.add_argument("--only", help="conditions, divided by commas")
-    ask.add_argument("--profiles", default=",".join(PROFILES) + ",cover-deploy")
+    ask.add_argument("--profiles", help="in place of both, and the cover's deployment at the three noise levels")
     ask.add_argument("--seed", type=int, default=1000, help="the first flight's")
     ask.add_argument("--json", help="file for the figures")
     ask.add_argument("--random", type=int, help="only this many random events")
@@ -242,8 +242,10 @@ def main() -> None:
     rows = []
     with ProcessPoolExecutor() as pool:
         for condition in names:
-            for profile in how.profiles.split(","):
-                count = how.runs or RUNS.get(condition, 40)
+            noise_only = condition == "nominal" or condition.endswith("noise")
+            profiles = how.profiles.split(",") if how.profiles else [*PROFILES, *["cover-deploy"] * noise_only]
+            for profile in profiles:
+                count = how.runs or (RUNS.get(condition, 40) if profile in PROFILES else 40)
                 jobs = [(profile, condition, how.seed + k) for k in range(count)]
                 row = summary(list(pool.map(one, jobs, chunksize=2)))
                 rows.append({"condition": condition, "profile": profile} | row)

@@ -10,15 +10,17 @@ from asflown import disturbance_torque, fly, load_craft, load_telemetry
 from asflown.estimate.compare import best_lag
 from asflown.estimate.corners import draw_torques
 from asflown.estimate.curves import gaussian_torque
-from asflown.estimate.latent import Series, arrange, response
+from asflown.estimate.latent import Series, arrange, response, step_of
 from asflown.estimate.latent_free import FreeBody, FreeLevels
 from asflown.estimate.latent_loop import HeldBody, LoopLevels
 from asflown.estimate.levels import fit_levels
 from asflown.estimate.result import spread
 from asflown.estimate.truth import against_truth
+from asflown.kit.ensemble import simulate
 from asflown.kit.errors import BadInput
 from asflown.kit.smoother import smooth
 from conftest import flight_data
+from estimate.linear_loop import respond
 
 CASSINI = load_craft("cassini")
 BODY = HeldBody.under(CASSINI.wheel_controller, 5226.0)
@@ -38,26 +40,14 @@ def coverage(result, truth, share=0.95):
 
 def drawn_from_the_model(body, levels, rows, seed, seconds=480):
     """Series and torque drawn from a body's own Gaussian model: what its bounds are bounds of."""
-    rng = np.random.default_rng(seed)
     empty = [Series(r, np.arange(0, seconds + 0.1, step), np.ones(int(seconds / step) + 1)) for r, step in rows]
     times, data = arrange(empty, np.arange(seconds + 1.0))
     model = body.smooth_model(levels, times)
-
-    def root(q):
-        w, V = np.linalg.eigh(q)
-        return V * np.sqrt(np.maximum(w, 0))
-
-    roots = [root(q + model.scale[0, 0] * d) for q, d in zip(model.Q, model.driven[0], strict=True)]
-    x, torque, value = root(model.covariance) @ rng.standard_normal(body.STATES), [], np.empty(len(data.row))
-    for k in range(len(times.seconds)):
-        if k:
-            x = model.A[model.which[k]] @ x + roots[model.which[k]] @ rng.standard_normal(body.STATES)
-        for i in range(data.start[k], data.start[k + 1]):
-            value[i] = model.H[data.row[i]] @ x + np.sqrt(model.R[data.row[i]]) * rng.standard_normal()
-        torque.append(body.inertia_kgm2 * x[body.torque])
-    step = np.searchsorted(data.start, np.arange(len(value)), side="right") - 1
-    series = [Series(r, times.seconds[step[data.row == r]], value[data.row == r]) for r, _ in rows]
-    return series, times, replace(data, value=value), np.array(torque), model
+    torque, value = simulate(model, data, [body.torque], 1, np.random.default_rng(seed))
+    data = replace(data, value=value[:, 0])
+    at = times.seconds[step_of(data)]
+    series = [Series(r, at[data.row == r], data.value[data.row == r]) for r, _ in rows]
+    return series, times, data, body.inertia_kgm2 * torque[:, 0, 0], model
 
 
 def test_law_one_axis_model_is_the_loop_of_the_papers():
@@ -108,7 +98,7 @@ def test_law_sensitivities_are_what_other_numbers_would_measure():
     t = np.arange(0, 481.0)
     torque = 0.02 * np.sin(2 * np.pi * t / 80) * (t > 60) * (t < 380)
     rows = [(0, 2), (1, 4), (2, 4)]
-    series, times, data, _, _ = drawn_from_the_model(BODY, LEVELS, rows, 0)
+    _, times, data, _, _ = drawn_from_the_model(BODY, LEVELS, rows, 0)
     clean = response(BODY, LEVELS, times, data, torque)
     tight = replace(LEVELS, rate_white_rad_s=1e-9, momentum_white_Nms=1e-6, error_white_rad=1e-9, error_slow_rad=1e-9)
     best = smooth(BODY.smooth_model(tight, times), replace(data, value=clean))
@@ -121,6 +111,27 @@ def test_law_sensitivities_are_what_other_numbers_would_measure():
     stored = data.row == 2
     assert np.allclose(found["spin_inertia"][stored], clean[stored], atol=0.02 * np.abs(clean[stored]).max())
     assert not found["spin_inertia"][~stored].any() and not found["inertia"][stored].any()
+
+
+@pytest.mark.parametrize("limit", ["momentum", "transfer"])
+def test_law_the_papers_methods_are_limits(limit):
+    """Total momentum alone, or attitude error alone taken as exact: each gives a smooth torque back, on a loop that
+    shares no line with the model."""
+    t = np.arange(0, 480 + 1e-9, 0.125)
+    torque = 0.02 * np.sin(2 * np.pi * t / 120) ** 3
+    attitude, rate, momentum = respond(t, torque, 5226.0)
+    if limit == "momentum":
+        body = FreeBody(inertia_kgm2=5226.0, wiener=True)
+        levels = FreeLevels(0.02, 15, 1e-8, 1e-6, 0.02, 5)
+        series = [Series(1, t[::32], rate[::32]), Series(2, t[::32], momentum[::32])]
+    else:
+        body = replace(BODY, wiener=True)
+        levels = replace(LEVELS, torque_Nm=0.02, error_white_rad=1e-9, error_slow_rad=1e-12, reaction_Nm_sqrt_s=1e-9)
+        series = [Series(0, t[::16], -attitude[::16])]
+    times, data = arrange(series, np.arange(481.0))
+    best = body.inertia_kgm2 * smooth(body.smooth_model(levels, times), data).mean[times.wanted, body.torque]
+    inner = slice(20, 460)
+    assert np.allclose(best[inner], torque[::8][inner], atol=3e-4)  # N m of 0.02
 
 
 def test_series_of_different_times_merge_into_one_pass():
@@ -303,7 +314,7 @@ def test_a_loop_that_does_not_explain_the_data_is_not_used():
     }
     r = fused(replace(flight.telemetry, channels=mixed))
     assert r.settings["loop"] == "measured" and any("is not used" in d for d in r.doubts)
-    assert coverage(r, flight.truth)[1] < 6e-4
+    assert coverage(r, flight.truth)[1] < 9e-4
     with_it = fused(replace(flight.telemetry, channels=mixed), loop="modelled")
     assert any("does not explain" in d for d in with_it.doubts)
 

@@ -22,8 +22,9 @@ from ..sim.scenario import Scenario, load_scenario
 #: A method by name: its own, corrected, or with "-printed".
 DEFAULT_METHODS = ("momentum-printed", "transfer-printed", "momentum", "transfer", "fused")
 
-#: Within this of a true peak counts as at the corner. [s]
-_CORNER_S = 2.0
+#: Within this of a true peak counts as at the corner; within this a peak's own figure is looked for. [s]
+_CORNER_S, _PEAK_S = 2.0, 5.0
+_SIGMAS = {0.68: 1.0, 0.95: 1.96}
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,8 @@ class Figure:
 
 @dataclass(frozen=True)
 class BudgetRow:
-    """One method over all flights.  Coverages are shares of instants inside the band; None without a band."""
+    """One method over all flights.  Coverages are shares of instants inside the band, and of peak figures inside
+    theirs; None without a band."""
 
     method: str
     rms_Nm: Figure
@@ -53,12 +55,14 @@ class BudgetRow:
     coverage_68: Figure | None
     coverage_95: Figure | None
     corner_coverage_95: Figure | None
+    peak_coverage_95: Figure | None
     peak_error_percent: tuple[Figure, ...]
     failed: int
 
     def record(self) -> dict:
         row: dict = {"method": self.method, "failed": self.failed}
-        for name in ("rms_Nm", "lag_s", "peak_lag_s", "coverage_68", "coverage_95", "corner_coverage_95"):
+        for name in ("rms_Nm", "lag_s", "peak_lag_s", "coverage_68", "coverage_95", "corner_coverage_95",
+                     "peak_coverage_95"):  # fmt: skip
             f = getattr(self, name)
             row[name], row[f"{name}_mc"] = (None, None) if f is None else (f.value, f.error)
         row["peak_error_percent"] = [f.value for f in self.peak_error_percent]
@@ -134,13 +138,25 @@ def _judge(result: TorqueResult, flight, axis: str) -> dict:
         "peaks": errors.peak_error_percent,
     }
     if result.sigma_Nm is not None:
-        pull = np.abs(result.torque_Nm[:, j] - np.interp(result.time_s, time_s, torque)) / result.sigma_Nm[:, j]
-        pull = np.where(np.isfinite(pull), pull, np.inf)
-        sample |= {"in68": np.mean(pull < 1), "in95": np.mean(pull < 1.96)}
+        true = np.interp(result.time_s, time_s, torque)
+        inside = {share: _inside(result, j, true, share) for share in (0.68, 0.95)}
+        sample |= {"in68": np.mean(inside[0.68]), "in95": np.mean(inside[0.95])}
         if peaks:
             near = np.min(np.abs(result.time_s[:, None] - [t for t, _ in peaks]), axis=1) <= _CORNER_S
-            sample["corner"] = np.mean(pull[near] < 1.96)
+            sample["corner"] = np.mean(inside[0.95][near])
+        if peaks and result.paths_Nm is not None:
+            figures = [(*result.peak_height(t, _PEAK_S, axis), v) for t, v in peaks]
+            sample["peak95"] = np.mean([abs(h - v) < 1.96 * s for h, s, v in figures])
     return sample
+
+
+def _inside(result: TorqueResult, axis: int, true: np.ndarray, share: float) -> np.ndarray:
+    """Where the truth lies in the band of that share; a method without a posterior has one of so many sigma."""
+    bounds = result.band(share)
+    if bounds is not None:
+        low, high = (b[:, axis] for b in bounds)
+        return (low <= true) & (true <= high)
+    return np.abs(result.torque_Nm[:, axis] - true) < _SIGMAS[share] * result.sigma_Nm[:, axis]
 
 
 def _row(name: str, samples: list[dict], failed: int) -> BudgetRow:
@@ -152,7 +168,7 @@ def _row(name: str, samples: list[dict], failed: int) -> BudgetRow:
 
     peaks = np.array([s["peaks"] for s in samples]) if samples else np.empty((0, 0))
     return BudgetRow(
-        name, figure("rms"), figure("lag"), figure("peak_lag"), maybe("in68"), maybe("in95"), maybe("corner"),
+        name, figure("rms"), figure("lag"), figure("peak_lag"), maybe("in68"), maybe("in95"), maybe("corner"), maybe("peak95"),
         tuple(Figure.of(column) for column in peaks.T), failed,
     )  # fmt: skip
 

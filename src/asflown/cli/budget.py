@@ -68,11 +68,11 @@ def _print(rows) -> None:
         return "     ·      " if f is None else f"{f.value:5.3f} ±{f.error:5.3f}"
 
     print(
-        f"  {'method':18s} {'rms [mN m]':>12s} {'lag [s]':>13s}  {'68 % band':12s} {'95 % band':12s} {'at corners':12s}  failed"
+        f"  {'method':18s} {'rms [mN m]':>12s} {'lag [s]':>13s}  {'68 % band':12s} {'95 % band':12s} {'at corners':12s} {'peak figure':12s}  failed"
     )
     for r in rows:
         print(f"  {r.method:18s} {1e3 * r.rms_Nm.value:6.2f} ±{1e3 * r.rms_Nm.error:4.2f} {r.lag_s.value:+7.2f} ±{r.lag_s.error:4.2f}  "
-              f"{share(r.coverage_68)} {share(r.coverage_95)} {share(r.corner_coverage_95)}  {r.failed:6d}")  # fmt: skip
+              f"{share(r.coverage_68)} {share(r.coverage_95)} {share(r.corner_coverage_95)} {share(r.peak_coverage_95)}  {r.failed:6d}")  # fmt: skip
     if any(r.peak_error_percent for r in rows):
         print("  error at the peaks [%], mean over flights (+ is too large)")
         for r in rows:

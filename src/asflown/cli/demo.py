@@ -11,7 +11,13 @@ from .output import print_doubts, print_json, provenance, say
 
 SEED = 2016
 PROFILES = {"profile-1": ("Table 3", "21"), "profile-2": ("Table 4", "22")}
-WAYS = (("momentum", "printed"), ("transfer", "printed"), ("momentum", "corrected"), ("transfer", "corrected"))
+WAYS = (
+    ("momentum", "printed"),
+    ("transfer", "printed"),
+    ("momentum", "corrected"),
+    ("transfer", "corrected"),
+    ("fused", "corrected"),
+)
 
 
 def demo(
@@ -80,8 +86,12 @@ def _profile(name: str, out: Path, step) -> dict:
     step(f"{name}: drawing")
     save(torque_figure(results[:2], "y", f"{name}: the printed methods against the torque flown (000 Fig {number})", truth=truth),
          out / f"fig{number}-{name}.svg")  # fmt: skip
-    save(torque_figure(results[2:], "y", f"{name}: the corrected methods, 2-sigma bands", truth=truth),
+    save(torque_figure(results[2:4], "y", f"{name}: the corrected methods, 95 % bands of noise", truth=truth),
          out / f"fig{number}-{name}-corrected.svg")  # fmt: skip
+    save(
+        torque_figure(results[4:], "y", f"{name}: all channels at once, 95 % band", truth=truth),
+        out / f"{name}-fused.svg",
+    )
     return {"profile": name, "table": label, "published_unsigned_percent": PUBLISHED_PEAK_ERRORS[name], "rows": rows}
 
 
@@ -123,6 +133,9 @@ def _cover(out: Path, step) -> dict:
             stall_s=stall,
         ),
     }
+    figures["cover-deploy-fused"] = actuation.torque_figure(
+        [results[WAYS[4]]], "y", "Deploy: all channels at once, 95 % band", truth=truth, stall_s=stall
+    )
     step("cover-stow: flying and drawing")
     _, stow = _fly("cover-stow", out, "nominal")
     figures["figB1-stow-momentum"] = actuation.momentum_figure(
@@ -131,7 +144,7 @@ def _cover(out: Path, step) -> dict:
     for name, figure in figures.items():
         save(figure, out / f"{name}.svg")
     both = compare_torques(t_hrwa, t_tf, "y")
-    return actuation_summary(telemetry, t_hrwa, both, stall) | {"doubts": list(results[WAYS[2]].doubts)}
+    return actuation_summary(telemetry, t_hrwa, both, stall) | {"doubts": list(results[WAYS[4]].doubts)}
 
 
 def _print_table(table: dict) -> None:

@@ -13,7 +13,7 @@ AXES = ("x", "y", "z")
 
 
 #: Half of a peak's surroundings in which its own extremum is looked for. [s]
-_PEAK_REACH_S = 5.0
+PEAK_REACH_S = 5.0
 
 
 def spread(samples: np.ndarray) -> np.ndarray:
@@ -225,9 +225,7 @@ def find_peaks(result: TorqueResult, axis: int) -> list[Peak]:
         if sure[k]:
             t = float(result.time_s[k])
             drawn = (
-                (float(torque[k]), None)
-                if result.paths_Nm is None
-                else result.peak_height(t, _PEAK_REACH_S, AXES[axis])
+                (float(torque[k]), None) if result.paths_Nm is None else result.peak_height(t, PEAK_REACH_S, AXES[axis])
             )
             peaks.append(Peak(t, drawn[0], AXES[axis], drawn[1]))
     return peaks
@@ -238,7 +236,7 @@ def _value(peak: Peak) -> str:
 
 
 def save_csv(result: TorqueResult, path, provenance: dict) -> None:
-    """The torque as a self-describing table: time, torque, sigma and momentum per axis; blank where unknown.
+    """The torque as a self-describing table: time, torque, sigma, momentum and bands per axis; blank where unknown.
 
     Doubts and provenance stand in comment lines.  Nothing half-written stays."""
     unit, momentum_unit = ("rad/s2", "rad/s") if result.relative else ("N m", "N m s")
@@ -251,6 +249,9 @@ def save_csv(result: TorqueResult, path, provenance: dict) -> None:
     ):
         if values is not None:
             columns += [(f"{name}{suffix}_{AXES[j]} [{u}]", values[:, j]) for j in result.axes]
+    for n in (68, 95):
+        for end, values in zip(("low", "high"), result.band(n / 100) or (), strict=False):
+            columns += [(f"band_{n}_{end}{suffix}_{AXES[j]} [{unit}]", values[:, j]) for j in result.axes]
     lines = [
         f"# epoch: {result.epoch}",
         f"# disturbance torque on the body, body axes; craft {result.craft}; {result.method}, {result.variant}",

@@ -68,29 +68,32 @@ def smoothed(g: Gains, values: np.ndarray, states) -> np.ndarray:
     )  # fmt: skip
 
 
+def simulate(model: Model, data: Measurements, states, count: int, rng: np.random.Generator):
+    """``count`` flights of a model from a start of mean zero: some states (N, S, K), and what is measured (M, K)."""
+    steps, n = len(model.which), len(model.mean)
+    noise = np.einsum("krc,kcj->krj", _roots(model.Q)[model.which], rng.standard_normal((steps, n, count)))
+    for j, D in enumerate(model.driven):
+        part = np.einsum("krc,kcj->krj", _roots(D)[model.which], rng.standard_normal((steps, n, count)))
+        noise += np.sqrt(model.scale[:, j, None, None]) * part
+    noise[0] = _roots(model.covariance[None])[0] @ rng.standard_normal((n, count))
+    reading = np.sqrt(model.R[data.row])[:, None] * rng.standard_normal((len(data.row), count))
+    states = np.asarray(states, np.int64)
+    return _simulate(model.A, model.which, model.H, data.start, data.row, noise, reading, states)
+
+
 def paths(g: Gains, residual: np.ndarray, states, rng: np.random.Generator) -> np.ndarray:
     """Paths of some states, (K, N, S), one given each column of measurements (M, K).
 
     A path and its measurements are simulated and the smoothed difference to the true ones added (Durbin
     and Koopman's simulation smoother)."""
-    states = np.asarray(states, np.int64)
-    n, steps = len(g.model.mean), len(g.model.which)
+    steps, n = len(g.model.which), len(g.model.mean)
     batch = max(1, _BATCH_VALUES // (n * steps))
-    parts = [_some_paths(g, residual[:, k : k + batch], states, rng) for k in range(0, residual.shape[1], batch)]
-    return np.concatenate(parts)
-
-
-def _some_paths(g: Gains, residual: np.ndarray, states: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    m, d = g.model, g.data
-    steps, n, count = len(m.which), len(m.mean), residual.shape[1]
-    noise = np.einsum("krc,kcj->krj", _roots(m.Q)[m.which], rng.standard_normal((steps, n, count)))
-    for j, D in enumerate(m.driven):
-        part = np.einsum("krc,kcj->krj", _roots(D)[m.which], rng.standard_normal((steps, n, count)))
-        noise += np.sqrt(m.scale[:, j, None, None]) * part
-    noise[0] = _roots(m.covariance[None])[0] @ rng.standard_normal((n, count))
-    reading = np.sqrt(m.R[d.row])[:, None] * rng.standard_normal(residual.shape)
-    drawn, simulated = _simulate(m.A, m.which, m.H, d.start, d.row, noise, reading, states)
-    return np.ascontiguousarray(np.moveaxis(drawn + smoothed(g, residual - simulated, states), 2, 0))
+    parts = []
+    for k in range(0, residual.shape[1], batch):
+        some = residual[:, k : k + batch]
+        drawn, simulated = simulate(g.model, g.data, states, some.shape[1], rng)
+        parts.append(np.moveaxis(drawn + smoothed(g, some - simulated, states), 2, 0))
+    return np.ascontiguousarray(np.concatenate(parts))
 
 
 def _roots(Q: np.ndarray) -> np.ndarray:

@@ -24,8 +24,10 @@ def time_scale(time_s) -> tuple[float, str]:
     return (3600.0, "h") if len(time_s) and time_s[-1] - time_s[0] > 3 * 3600 else (60.0, "min")
 
 
-def draw_torque(result: TorqueResult, ax, axis: int, *, color=BLUE, label=None, band_sigmas: float = 2.0):
-    """One axis of a torque with its band; lines break where nothing is known. Returns ax."""
+def draw_torque(result: TorqueResult, ax, axis: int, *, color=BLUE, label=None):
+    """One axis of a torque with its 95 % band, that of the posterior where there is one; lines break where nothing is known.
+
+    Returns ax."""
     scale, unit = torque_scale(result)
     t = result.time_s / time_scale(result.time_s)[0]
     torque = scale * result.torque_Nm[:, axis]
@@ -37,8 +39,11 @@ def draw_torque(result: TorqueResult, ax, axis: int, *, color=BLUE, label=None, 
         label=label or f"{result.method}, {result.variant}",
     )
     if result.sigma_Nm is not None:
-        s = band_sigmas * scale * result.sigma_Nm[:, axis]
-        ax.fill_between(t, torque - s, torque + s, color=color, alpha=0.18, linewidth=0)
+        s = 1.96 * scale * result.sigma_Nm[:, axis]
+        low, high = (
+            (torque - s, torque + s) if (band := result.band(0.95)) is None else (scale * b[:, axis] for b in band)
+        )
+        ax.fill_between(t, low, high, color=color, alpha=0.18, linewidth=0)
     ax.set_ylabel(f"torque {AXES[axis]} [{unit}]")
     return ax
 
@@ -62,7 +67,7 @@ def save_torque_figure(results: list[TorqueResult], path) -> None:
         ax.axhline(0, color=GREY, linewidth=0.6)
     if len(results) > 1:
         panels[0].legend(loc="upper right", fontsize=8, frameon=False)
-    panels[0].set_title(f"Disturbance torque on {results[0].craft}: {results[0].method}, {results[0].variant} (bands: 2 sigma)",
+    panels[0].set_title(f"Disturbance torque on {results[0].craft}: {results[0].method}, {results[0].variant} (bands: 95 %)",
                         loc="left", fontsize=11)  # fmt: skip
     panels[-1].set_xlabel(f"time from {results[0].epoch} [{time_scale(results[0].time_s)[1]}]")
     if results[0].doubts:

@@ -1,0 +1,105 @@
+"""What should the corner prior believe beforehand of roughness, corners and bends?
+
+Run: python studies/corners.py [flights]     (twenty minutes for 12)
+
+Flies three kinds of torque at nominal noise, pulses starting at random fractions of a second: triangles of 30 and
+15 s (no roughness at all), the cover's deployment, and waves of random size and length (no corner at all).
+For each choice prints RMS error and how often the 95 % and 68 % bands hold.
+
+Answer, 2026-11 (12 flights each, RMS in mN m, then the two bands):
+ANSWER
+"""
+
+import sys
+from contextlib import contextmanager
+from itertools import count
+
+import numpy as np
+
+from asflown import disturbance_torque, fly, load_craft
+from asflown.estimate import corners
+from asflown.sim.scenario import load_scenario
+
+CHOICES = {
+    "as shipped": {},
+    "half to pure lines": {"_PRIOR": (0.5, 0.125, 0.125, 0.125, 0.125)},
+    "all the same": {"_PRIOR": (0.2,) * 5},
+    "only lines": {"_PRIOR": (0.9999, 1e-4 / 4, 1e-4 / 4, 1e-4 / 4, 1e-4 / 4)},
+    "roughness of 2 s": {"ROUGH_LENGTH_S": 2.0},
+    "roughness of 8 s": {"ROUGH_LENGTH_S": 8.0},
+    "nearby is 5 s": {"_NEARBY_S": 5.0},
+    "nearby is 20 s": {"_NEARBY_S": 20.0},
+    "bends of freedom 3": {"BEND_FREEDOM": 3.0},
+    "one corner in 100": {"_CORNER_PRIOR": (1.0, 100.0)},
+    "one corner in 5": {"_CORNER_PRIOR": (1.0, 5.0)},
+    "a fifth of the proposals": {"_PROPOSALS": 20},
+    "five times the proposals": {"_PROPOSALS": 500},
+}
+CRAFT = load_craft("cassini")
+
+
+def waves(seed: int):
+    """A hold with a torque of three random waves, rising and fading over a minute."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(60.0, 420.0, 1.0)
+    envelope = np.clip(np.minimum(t - 60, 420 - t) / 60, 0, 1)
+    torque = sum(
+        rng.normal(0, 5e-3) * np.sin(2 * np.pi * t / rng.uniform(20, 120) + rng.uniform(0, 6)) for _ in range(3)
+    )
+    return load_scenario("quiet").changed(torques=[{
+        "shape": "table", "axis": "y", "times": " ".join(f"{x:g}" for x in t) + " s",
+        "torques": " ".join(f"{x:.6g}" for x in envelope * torque) + " N m",
+    }])  # fmt: skip
+
+
+def triangles(name: str, seed: int):
+    plan = load_scenario(name)
+    start = 60 + np.random.default_rng(seed).uniform(-0.5, 0.5)
+    return plan.changed(torques=[dict(x, first=f"{start:.3f} s") for x in plan.as_written["torques"]])
+
+
+KINDS = {
+    "30-s triangles": lambda seed: triangles("profile-1", seed),
+    "15-s triangles": lambda seed: triangles("profile-2", seed),
+    "cover": lambda seed: load_scenario("cover-deploy"),
+    "waves": waves,
+}
+
+
+@contextmanager
+def chosen(changes: dict):
+    before = {k: getattr(corners, k) for k in changes}
+    for k, v in changes.items():
+        setattr(corners, k, v)
+    try:
+        yield
+    finally:
+        for k, v in before.items():
+            setattr(corners, k, v)
+
+
+def judged(flight) -> tuple[float, float, float]:
+    r = disturbance_torque(flight.telemetry, CRAFT, axis="y", method="fused")
+    true = np.interp(r.time_s, flight.truth.time_s, flight.truth.torque_Nm[:, 1])
+    inside = []
+    for share in (0.95, 0.68):
+        low, high = r.band(share)
+        inside.append(np.mean((low[:, 1] <= true) & (true <= high[:, 1])))
+    return float(np.mean((r.torque_Nm[:, 1] - true) ** 2)), *inside
+
+
+def main(flights: int) -> None:
+    flown = {kind: [fly(plan(seed), seed=seed) for seed, _ in zip(count(500), range(flights), strict=False)]
+             for kind, plan in KINDS.items()}  # fmt: skip
+    print(f"{'':26s}" + "".join(f"{k:>24s}" for k in KINDS))
+    for name, changes in CHOICES.items():
+        cells = []
+        with chosen(changes):
+            for flight_list in flown.values():
+                square, in95, in68 = np.mean([judged(f) for f in flight_list], axis=0)
+                cells.append(f"{1e3 * np.sqrt(square):.2f}  {in95:.3f}  {in68:.3f}")
+        print(f"{name:26s}" + "".join(f"{c:>24s}" for c in cells), flush=True)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 12)
