@@ -10,13 +10,18 @@ and 1/2.4 of the printed transfer method's (geometric mean over profiles and noi
 0.92 to 0.98, 68 % band 0.63 to 0.75, near corners and for the peak figure 0.90 to 0.98.
 """
 
+# ruff: noqa: E402  (threads are limited before numpy is there)
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")  # a process a core; threads of each would only wait for one another
 
 import numpy as np
 

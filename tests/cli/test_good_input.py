@@ -76,6 +76,20 @@ def test_all_axes_are_rows_of_three(good):
     assert finite(record["torque_Nm"])[:, 1].tolist() == torque(good, "--axis", "y")["torque_Nm"]
 
 
+def test_fused_adds_bands_and_an_impulse_with_its_sigma(good):
+    record = torque(good, "--axis", "y", "--impulse", "180,300", "--consider", "inertia=0.02,spin_inertia=0")
+    for share in ("68", "95"):
+        band = record[f"band_{share}_Nm"]
+        assert np.all(finite(band["low"]) <= finite(band["high"])) and len(band["low"]) == 481
+    (found,) = record["impulses"]
+    assert (found["start_s"], found["stop_s"], found["axis"]) == (180, 300, "y")
+    # the pulse: 0.02 N m at its peak, 40 s up and down
+    assert abs(found["impulse_Nms"] - 0.8) < 4 * found["sigma_Nms"] + 0.02 and 0 < found["sigma_Nms"] < 0.1
+    assert "spin_inertia" not in record["settings"]["considered"]["y"]
+    assert record["provenance"]["options"]["consider"] == "inertia=0.02,spin_inertia=0"
+    assert "impulse y from 180 to 300 s" in run("torque", good, "--axis", "y", "--impulse", "180,300").out
+
+
 def test_comparison_is_in_the_same_object(good):
     record = run("torque", good, "--json", "--axis", "y", "--compare").record
     assert len(record["comparison"]) >= 4

@@ -146,7 +146,7 @@ def _judge(result: TorqueResult, flight, axis: str) -> dict:
             sample["corner"] = np.mean(inside[0.95][near])
         if peaks and result.paths_Nm is not None:
             figures = [(*result.peak_height(t, _PEAK_S, axis), v) for t, v in peaks]
-            sample["peak95"] = np.mean([abs(h - v) < 1.96 * s for h, s, v in figures])
+            sample["peak95"] = np.mean([s is not None and abs(h - v) < 1.96 * s for h, s, v in figures])
     return sample
 
 
@@ -156,7 +156,8 @@ def _inside(result: TorqueResult, axis: int, true: np.ndarray, share: float) -> 
     if bounds is not None:
         low, high = (b[:, axis] for b in bounds)
         return (low <= true) & (true <= high)
-    return np.abs(result.torque_Nm[:, axis] - true) < _SIGMAS[share] * result.sigma_Nm[:, axis]
+    sigma = np.full_like(result.torque_Nm, np.nan) if result.sigma_Nm is None else result.sigma_Nm
+    return np.abs(result.torque_Nm[:, axis] - true) < _SIGMAS[share] * sigma[:, axis]
 
 
 def _row(name: str, samples: list[dict], failed: int) -> BudgetRow:

@@ -122,8 +122,8 @@ def fused(
     if unexplained and loop is None and record.loop == "modelled":
         *answer, others, drawn = fused(subject, prior, axes, "measured", considered, seed)
         if sum(UNEXPLAINED in d for d in others) < len(unexplained):
-            why = f"the loop as the craft file describes it is not used, the actuators' action is taken as measured: {unexplained[0]}"
-            return (*answer, [why, *others], drawn)
+            instead = f"the loop as the craft file describes it is not used, the actuators' action is taken as measured: {unexplained[0]}"
+            return (*answer, [instead, *others], drawn)
     settings = {"prior": prior, "loop": record.loop, "seed": seed} | _settings(solved)
     return record.grid, torque, sigma, momentum, settings, doubts, paths
 
