@@ -3,6 +3,7 @@
     python benchmarks/torque_accuracy.py                      # everything, half an hour on two cores
     python benchmarks/torque_accuracy.py --runs 8 --only "nominal,half noise"
     python benchmarks/torque_accuracy.py --random 1000        # random events: does any fail?
+    python benchmarks/torque_accuracy.py --bound 60           # torques drawn from the prior, beside the Cramer-Rao bound
 
 Every flight has a seed of its own, and its pulses start at a random fraction of a second, so that no corner
 lies on a sample or on the estimator's grid by design.  Wanted: RMS at most 1/4 of the printed momentum method's
@@ -27,7 +28,14 @@ import numpy as np
 
 from asflown import disturbance_torque, fly, load_craft
 from asflown.estimate.compare import best_lag
+from asflown.estimate.corners import draw_torques
+from asflown.estimate.curves import gaussian_torque
+from asflown.estimate.latent import Series, arrange, step_of
+from asflown.estimate.latent_loop import HeldBody, LoopLevels
+from asflown.estimate.levels import fit_levels
+from asflown.kit.ensemble import simulate
 from asflown.kit.errors import BadInput
+from asflown.kit.smoother import smooth
 from asflown.sim.scenario import load_scenario
 
 PROFILES = ("profile-1", "profile-2")
@@ -196,6 +204,43 @@ def random_events(count: int, seed: int) -> int:
     return len(failed)
 
 
+def near_the_bound(job) -> tuple[float, float, float, float]:
+    """Square errors of one torque drawn from the Matern model: bound, levels known, and fitted with each prior."""
+    length, seed = job
+    body = HeldBody.under(load_craft("cassini").wheel_controller, 5333.0)
+    levels = LoopLevels(0.01, length, 2e-6, 1e-3, 5e-6, 8e-6, 15, 3e-4)
+    rows = ((0, 2), (1, 4), (2, 4))
+    empty = [Series(r, np.arange(0, 480.1, step), np.ones(480 // step + 1)) for r, step in rows]
+    times, data = arrange(empty, np.arange(481.0))
+    model = body.smooth_model(levels, times)
+    drawn, value = simulate(model, data, [body.torque], 1, np.random.default_rng(seed))
+    torque, data = body.inertia_kgm2 * drawn[:, 0, 0], replace(data, value=value[:, 0])
+    best = smooth(model, data)
+    bound = body.inertia_kgm2**2 * best.covariance[:, body.torque, body.torque].mean()
+    at = times.seconds[step_of(data)]
+    fit = fit_levels(body, [Series(r, at[data.row == r], data.value[data.row == r]) for r, _ in rows])
+    again, measured = arrange(fit.series, np.arange(481.0))
+    errors = []
+    for solve in (gaussian_torque, draw_torques):
+        post = solve(
+            body, fit.levels, again, measured, np.empty((len(measured.row), 0)), 400, np.random.default_rng(seed)
+        )
+        errors.append(float(np.mean((post.mean[again.wanted] - torque[times.wanted]) ** 2)))
+    return float(bound), float(np.mean((body.inertia_kgm2 * best.mean[:, body.torque] - torque) ** 2)), *errors
+
+
+def bounds(count: int, seed: int) -> None:
+    """RMS error over the posterior Cramer-Rao bound, for torques drawn from the smooth prior (wanted: at most 1.15)."""
+    print("rms error / Cramer-Rao bound    bound [mN m]  levels known  fitted, matern  fitted, edges")
+    with ProcessPoolExecutor() as pool:
+        for length in (8.0, 15.0, 40.0):
+            squares = np.mean(list(pool.map(near_the_bound, [(length, seed + k) for k in range(count)])), axis=0)
+            known, matern, edges = np.sqrt(squares[1:] / squares[0])
+            print(
+                f"torque's length {length:4.0f} s {1e3 * np.sqrt(squares[0]):21.2f} {known:13.3f} {matern:15.3f} {edges:14.3f}"
+            )
+
+
 COLUMNS = (
     ("rms", "rms_mNm", "{:.2f}"), ("/momentum", "momentum_ratio", "{:.1f}"), ("/transfer", "transfer_ratio", "{:.1f}"),
     ("lag", "lag", "{:+.2f}"), ("95 %", "band_95", "{:.3f}"), ("68 %", "band_68", "{:.3f}"), ("1.96 s", "sigma_95", "{:.3f}"),
@@ -239,9 +284,14 @@ def main() -> None:
     ask.add_argument("--seed", type=int, default=1000, help="the first flight's")
     ask.add_argument("--json", help="file for the figures")
     ask.add_argument("--random", type=int, help="only this many random events")
+    ask.add_argument(
+        "--bound", type=int, help="only so many torques drawn from the prior, against the Cramer-Rao bound"
+    )
     how = ask.parse_args()
     if how.random:
         sys.exit(1 if random_events(how.random, how.seed) else 0)
+    if how.bound:
+        return bounds(how.bound, how.seed)
     names = how.only.split(",") if how.only else list(CONDITIONS)
     print(f"{'':32s} {'runs':>4s} " + " ".join(f"{t:>{max(len(t), 6)}s}" for t, _, _ in COLUMNS) + "  failed")
     rows = []
