@@ -102,7 +102,8 @@ def _most_probable(body: Body, centre: Levels, start: Levels, series, known: Kno
         return (-value if np.isfinite(value) else 1e10) + 0.5 * np.sum(((p - middle) / spread) ** 2)
 
     bounds = list(zip(middle - 4 * spread, middle + 4 * spread, strict=True))
-    found = optimize.minimize(cost, start.logs(), method="L-BFGS-B", bounds=bounds, options={"maxiter": 60})
+    # a likelihood of 1e4 and more is rounded to 1e-8: steps of the gradient must be larger than the usual 1e-8
+    found = optimize.minimize(cost, start.logs(), method="L-BFGS-B", bounds=bounds, options={"maxiter": 60, "eps": 1e-5})
     return kind.from_logs(found.x)
 
 
