@@ -51,6 +51,9 @@ class FreeBody(Body):
     STORED: ClassVar[int] = _STORED
     # lengths of a torque: from a thruster's seconds to an orbit
     SPREAD: ClassVar[tuple[float, ...]] = (1.5, 1.2, 0.7, 0.7, 1.5, 1.0, 1.0, 1.0, 1.0, 1.0)
+    # A channel's scale is not in the channel: regressed on its own smoothed self it would shrink towards nothing,
+    # the more so the longer the record.
+    NARROWS: ClassVar[bool] = False
 
     def control(self, v: FreeLevels) -> np.ndarray:
         """The actuators' torque on the body per unit inertia, (n,), of the states."""
