@@ -76,4 +76,6 @@ def blocks(series: list[Series], rows, turn: int) -> list[np.ndarray]:
 
 def between_ends(series: list[Series], row: int, first_s: float, last_s: float = 0.0) -> list[np.ndarray]:
     """Marks a whole channel but its first and last seconds, without which a constant would be free."""
-    return [(s.row == row) & (s.seconds - s.seconds[0] >= first_s) & (s.seconds[-1] - s.seconds >= last_s) for s in series]
+    return [
+        (s.row == row) & (s.seconds - s.seconds[0] >= first_s) & (s.seconds[-1] - s.seconds >= last_s) for s in series
+    ]

@@ -102,9 +102,10 @@ def _most_probable(body: Body, centre: Levels, start: Levels, series, known: Kno
         return (-value if np.isfinite(value) else 1e10) + 0.5 * np.sum(((p - middle) / spread) ** 2)
 
     bounds = list(zip(middle - 4 * spread, middle + 4 * spread, strict=True))
-    # a likelihood of 1e4 and more is rounded to 1e-8: steps of the gradient must be larger than the usual 1e-8
-    found = optimize.minimize(cost, start.logs(), method="L-BFGS-B", bounds=bounds, options={"maxiter": 60, "eps": 1e-5})
-    return kind.from_logs(found.x)
+    p = start.logs()
+    for step in body.SEARCH:
+        p = optimize.minimize(cost, p, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60, "eps": step}).x
+    return kind.from_logs(p)
 
 
 def _blocks(series) -> list[list[Series]]:
