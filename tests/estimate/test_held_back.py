@@ -1,10 +1,13 @@
 """Prediction of what was held back: exact under the model, and of unit size there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from asflown.estimate.curves import gaussian_torque, widened
 from asflown.estimate.held_back import APART, between_ends, blocks, hold_back, predict
-from asflown.estimate.latent import BODY_RATE, MOMENTUM, Series, arrange
+from asflown.estimate.latent import BODY_RATE, CONTROL_TORQUE, MOMENTUM, Series, arrange
 from asflown.estimate.latent_free import FreeBody, FreeLevels
 from asflown.kit.smoother import smooth
 
@@ -27,9 +30,7 @@ def drawn(seed: int) -> list[Series]:
             x = m.A[m.which[k]] @ x + rng.multivariate_normal(np.zeros(len(x)), Q, method="svd")
         values.append(m.H @ x)
     v = np.array(values)
-    return [
-        Series(r, SECONDS, v[:, r] + np.sqrt(m.R[r]) * rng.standard_normal(len(v))) for r in (BODY_RATE, MOMENTUM)
-    ]
+    return [Series(r, SECONDS, v[:, r] + np.sqrt(m.R[r]) * rng.standard_normal(len(v))) for r in (BODY_RATE, MOMENTUM)]
 
 
 def test_law_prediction_is_the_smoothing_of_the_rest():
@@ -72,3 +73,21 @@ def test_recovery_a_whole_channel_with_levels_fitted_to_the_rest():
     found = hold_back(BODY, series, between_ends(series, BODY_RATE, 120.0))
     assert len(found.pull) == 360 and set(found.row) == {BODY_RATE}
     assert np.std(found.whitened) == pytest.approx(1, abs=0.25)
+
+
+def test_law_a_scale_that_is_not_learnt_widens_the_band_and_leaves_the_mean():
+    """2 % of a commanded torque: the mean stays, and the band's variance gains that of 2 % of the torque's answer."""
+    momentum = drawn(2)[1].values
+    series = [drawn(2)[0], Series(CONTROL_TORQUE, SECONDS, -np.gradient(momentum))]
+    times, data = arrange(series)
+    none = np.empty((len(data.row), 0))
+    post = gaussian_torque(BODY, LEVELS, times, data, none, 2000, np.random.default_rng(0))
+    model = BODY.smooth_model(LEVELS, times)
+    best = smooth(model, data).mean
+    steps = np.repeat(np.arange(len(times.seconds)), np.diff(data.start))
+    pushed = best[steps] @ model.H[CONTROL_TORQUE]
+    column = 0.02 * np.where(data.row == CONTROL_TORQUE, pushed, 0.0)[:, None]
+    wide = widened(post, BODY, LEVELS, times, data, column, np.random.default_rng(1))
+    assert np.array_equal(wide.mean, post.mean) and wide.considered.std() == pytest.approx(1, abs=0.1)
+    moved = smooth(model, replace(data, value=column[:, 0])).mean[:, BODY.torque] * BODY.inertia_kgm2
+    assert wide.paths.var(axis=0) == pytest.approx(post.paths.var(axis=0) + moved**2, rel=0.25)
