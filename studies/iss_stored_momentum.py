@@ -142,7 +142,7 @@ def main(folder: Path | None = None) -> None:
     )
     results = {}
     for window in (None, LONG_WINDOW_S):
-        result = results[window] = asflown.disturbance_torque(telemetry, craft, window_s=window)
+        result = results[window] = asflown.disturbance_torque(telemetry, craft, method="momentum", window_s=window)
         half = result.settings["half_width_s"]
         known = np.isfinite(result.torque_Nm).all(axis=1)
         for j, axis in enumerate(AXES):

@@ -83,7 +83,8 @@ def test_law_a_delay_turns_the_phase_of_what_the_wheels_do():
 
 def test_law_total_momentum_feels_only_the_torque():
     """In the models d(I rate + h)/dt = T, whatever the wheels do beside their command."""
-    for body, levels in ((BODY, LEVELS), (FreeBody(inertia_kgm2=5226.0), FreeLevels(0.01, 15, 2e-6, 1e-3, 0.01, 2))):
+    free = FreeLevels(0.01, 15, 2e-6, 1e-3, 0.01, 2, 6, 5, 2e-6, 5)
+    for body, levels in ((BODY, LEVELS), (FreeBody(inertia_kgm2=5226.0), free)):
         F, Q = body.dynamics(levels)
         F[body.torque, body.slope] = 1
         if isinstance(body, HeldBody):

@@ -108,6 +108,8 @@ class Body:
     RATE: ClassVar[int]  # index of the body rate, and of the actuators' momentum
     STORED: ClassVar[int]
     SPREAD: ClassVar[tuple[float, ...]]  # of the weak log-normal priors, in the order of the Levels
+    SEARCH: ClassVar[tuple[float, ...]] = (1e-8,)  # steps of the likelihood's gradient, one search after the other
+    NARROWS: ClassVar[bool] = True  # whether the data may say how far off what is taken as known is
 
     @property
     def torque(self) -> int:

@@ -102,8 +102,10 @@ def _most_probable(body: Body, centre: Levels, start: Levels, series, known: Kno
         return (-value if np.isfinite(value) else 1e10) + 0.5 * np.sum(((p - middle) / spread) ** 2)
 
     bounds = list(zip(middle - 4 * spread, middle + 4 * spread, strict=True))
-    found = optimize.minimize(cost, start.logs(), method="L-BFGS-B", bounds=bounds, options={"maxiter": 60})
-    return kind.from_logs(found.x)
+    p = start.logs()
+    for step in body.SEARCH:
+        p = optimize.minimize(cost, p, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60, "eps": step}).x
+    return kind.from_logs(p)
 
 
 def _blocks(series) -> list[list[Series]]:

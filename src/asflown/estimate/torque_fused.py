@@ -8,7 +8,8 @@ update, and a gap only widens the band.
 
 What the torque may be is a prior: ``edges``, straight lines between corners with a roughness where the data
 ask for one (``corners``); ``matern`` or ``wiener``, a Gaussian process (``curves``).  What is taken as known
-(inertia, gains, spin inertia) is off by an unknown amount, which the data narrow and the band contains.
+(inertia, gains, spin inertia) is off by an unknown amount, which the band contains, and which the data narrow where
+the controller is known.
 
 Each axis is fitted by itself.  Its motion gives the gyroscopic torque w x H and the products of inertia's
 share, which a one-axis model would take for a disturbance; a second pass solves with these taken off.
@@ -24,7 +25,7 @@ from ..kit.errors import BadInput
 from ..kit.smoother import Measurements, smooth
 from ..telemetry.channels import AXES
 from .corners import COARSEST_S, draw_torques, spacing_s
-from .curves import gaussian_torque
+from .curves import gaussian_torque, widened
 from .innovations import UNEXPLAINED, Innovations, by_channel, considered_doubts, innovation_doubts
 from .latent import Body, Times, arrange, without_known
 from .latent_free import FreeBody
@@ -198,17 +199,20 @@ def _solve(
 
     data = without_known(body, fit.levels, times, whole, known if np.any(coupling) else None)
     names, columns = _columns(body, fit, times, whole, considered)
+    learnt = columns if body.NARROWS else columns[:, :0]
     doubts = fit_doubts(axis, fit)
     post = None
     if prior == "edges":
-        post = draw_torques(body, fit.levels, times, data, columns, PATHS, rng)
+        post = draw_torques(body, fit.levels, times, data, learnt, PATHS, rng)
         if not post.settings["explained"]:
             post = None
             doubts.append(
                 f"straight lines between corners do not explain the torque about {axis}: a smooth torque is taken in their place"
             )
     if post is None:
-        post = gaussian_torque(body, fit.levels, times, data, columns, PATHS, rng)
+        post = gaussian_torque(body, fit.levels, times, data, learnt, PATHS, rng)
+    if not body.NARROWS:
+        post = widened(post, body, fit.levels, times, data, columns, rng)
     if not (np.isfinite(post.paths).all() and np.isfinite(post.mean).all()):
         raise BadInput(
             "the model cannot be fitted to this record: its covariance lost its meaning",
