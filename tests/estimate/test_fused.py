@@ -123,7 +123,7 @@ def test_law_the_papers_methods_are_limits(limit):
     attitude, rate, momentum = respond(t, torque, 5226.0)
     if limit == "momentum":
         body = FreeBody(inertia_kgm2=5226.0, wiener=True)
-        levels = FreeLevels(0.02, 15, 1e-8, 1e-6, 0.02, 5)
+        levels = FreeLevels(0.02, 15, 1e-8, 1e-6, 0.02, 5, 100, 100, 1e-9, 5)
         series = [Series(1, t[::32], rate[::32]), Series(2, t[::32], momentum[::32])]
     else:
         body = replace(BODY, wiener=True)
