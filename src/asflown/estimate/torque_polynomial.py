@@ -66,7 +66,12 @@ def _fit(t, y, order):
             f"{len(t)} samples are too few for a polynomial of order {order}",
             remedy="Take a longer record, or a lower --order.",
         )
-    p = Polynomial.fit(t, y, order)
+    p, (_, rank, _, _) = Polynomial.fit(t, y, order, full=True)  # asked for, so that numpy does not warn
+    if rank <= order:
+        raise BadInput(
+            f"a gap leaves too little of the record to hold a polynomial of order {order}",
+            remedy="Narrow the window to a stretch without the gap (--start, --stop), or use a lower --order.",
+        )
     rms = float(np.sqrt(np.mean((y - p(t)) ** 2)))
     size = float(np.mean(np.abs(y)))
     return p, rms, 100 * rms / size if size > 0 else None
