@@ -15,6 +15,7 @@ from statsmodels.tsa.statespace import kalman_filter, kalman_smoother
 import asflown
 from asflown.estimate.latent import ATTITUDE_ERROR, BODY_RATE, MOMENTUM, Series, arrange
 from asflown.estimate.latent_loop import HeldBody, LoopLevels
+from asflown.kit.ensemble import simulate
 from asflown.kit.regression import local_polynomial
 from asflown.kit.smoother import Measurements, Model, smooth
 
@@ -33,7 +34,6 @@ def best_of(runs, work):
 
 def day() -> tuple[Model, Measurements]:
     """One axis of a craft under a torque, a day of its telemetry drawn from the model itself."""
-    rng = np.random.default_rng(0)
     body = HeldBody.under(asflown.load_craft("cassini").wheel_controller, inertia_kgm2=7000.0)
     levels = LoopLevels(
         torque_Nm=0.05, length_s=30.0, rate_white_rad_s=2e-6, momentum_white_Nms=0.02, error_white_rad=2e-5,
@@ -42,15 +42,8 @@ def day() -> tuple[Model, Measurements]:
     blank = [Series(row, s := np.arange(0.0, _DAY_S, cadence), np.zeros(len(s))) for row, cadence in _CADENCE_S.items()]
     times, data = arrange(blank)
     model = body.smooth_model(levels, times)
-    steps, n = len(model.which), len(model.mean)
-    noise = rng.multivariate_normal(np.zeros(n), process_noise(model), steps, method="eigh")
-    state = np.empty((steps, n))
-    state[0] = rng.normal(size=n) * np.sqrt(model.covariance.diagonal())
-    for k in range(1, steps):
-        state[k] = model.A[0] @ state[k - 1] + noise[k]
-    at = np.repeat(np.arange(steps), np.diff(data.start))
-    read = np.einsum("mn,mn->m", model.H[data.row], state[at]) + rng.normal(size=len(at)) * np.sqrt(model.R[data.row])
-    return model, Measurements(data.start, data.row, read)
+    _, read = simulate(model, data, [body.torque], 1, np.random.default_rng(0))
+    return model, Measurements(data.start, data.row, read[:, 0])
 
 
 def process_noise(model: Model) -> np.ndarray:
