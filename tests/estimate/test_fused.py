@@ -10,7 +10,7 @@ from asflown import disturbance_torque, fly, load_craft, load_telemetry
 from asflown.estimate.compare import best_lag
 from asflown.estimate.corners import draw_torques
 from asflown.estimate.curves import gaussian_torque
-from asflown.estimate.latent import Series, arrange, response, step_of
+from asflown.estimate.latent import Series, arrange, channel_of, response, step_of
 from asflown.estimate.latent_free import FreeBody, FreeLevels
 from asflown.estimate.latent_loop import HeldBody, LoopLevels
 from asflown.estimate.levels import fit_levels
@@ -83,7 +83,7 @@ def test_law_a_delay_turns_the_phase_of_what_the_wheels_do():
 
 def test_law_total_momentum_feels_only_the_torque():
     """In the models d(I rate + h)/dt = T, whatever the wheels do beside their command."""
-    free = FreeLevels(0.01, 15, 2e-6, 1e-3, 0.01, 2, 6, 5, 2e-6, 5)
+    free = FreeLevels(0.01, 15, 2e-6, 1e-3, 0.01, 2, 6, 5, 2e-6, 5, 0.1)
     for body, levels in ((BODY, LEVELS), (FreeBody(inertia_kgm2=5226.0), free)):
         F, Q = body.dynamics(levels)
         F[body.torque, body.slope] = 1
@@ -123,7 +123,7 @@ def test_law_the_papers_methods_are_limits(limit):
     attitude, rate, momentum = respond(t, torque, 5226.0)
     if limit == "momentum":
         body = FreeBody(inertia_kgm2=5226.0, wiener=True)
-        levels = FreeLevels(0.02, 15, 1e-8, 1e-6, 0.02, 5, 100, 100, 1e-9, 5)
+        levels = FreeLevels(0.02, 15, 1e-8, 1e-6, 0.02, 5, 100, 100, 1e-9, 5, 1e-3)
         series = [Series(1, t[::32], rate[::32]), Series(2, t[::32], momentum[::32])]
     else:
         body = replace(BODY, wiener=True)
@@ -144,6 +144,22 @@ def test_series_of_different_times_merge_into_one_pass():
     assert times.seconds.tolist() == [0, 1, 2, 3, 4] and times.wanted.tolist() == [False, True, True, True, False]
     assert data.start.tolist() == [0, 2, 2, 3, 3, 5]
     assert sorted(zip(data.row.tolist(), data.value.tolist(), strict=True)) == [(0, 1), (0, 2), (0, 3), (2, 7), (2, 8)]
+
+
+def test_a_sample_at_a_jump_has_a_noise_of_its_own():
+    """A wheel tears loose: the two readings beside it are uncertain by the jump's rate times that of their instants."""
+    t = np.arange(40.0)
+    values = 0.01 * np.sin(t) + 5.0 * (t >= 20)
+    s = Series(2, t, values).with_jumps()
+    assert np.flatnonzero(s.steep).tolist() == [19, 20] and s.steep[20] == pytest.approx(5, abs=0.05)
+    assert not s.where(t < 19).steep.any() and Series(2, t, 0.01 * np.sin(t)).with_jumps().steep is None
+    times, data = arrange([s])
+    assert channel_of(times, data).tolist() == [2] * 40 and data.row.max() == 5
+    body, levels = FreeBody(inertia_kgm2=1.0), FreeLevels(0.01, 15, 1e-3, 1e-2, 0.01, 2, 6, 5, 1e-3, 5, 0.1)
+    model = body.smooth_model(levels, times)
+    noise = np.sqrt(model.R[data.row])
+    assert noise[10] == pytest.approx(1e-2) and noise[19] == pytest.approx(np.hypot(1e-2, 0.1 * s.steep[19]))
+    assert np.array_equal(model.H[data.row[19]], model.H[2])
 
 
 @pytest.mark.parametrize("prior", ["matern", "edges"])

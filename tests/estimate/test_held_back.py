@@ -12,7 +12,7 @@ from asflown.estimate.latent_free import FreeBody, FreeLevels
 from asflown.kit.smoother import smooth
 
 BODY = FreeBody(inertia_kgm2=100.0)
-LEVELS = FreeLevels(0.02, 40.0, 2e-6, 2e-3, 0.05, 4.0, 6.0, 10.0, 2e-6, 5.0)
+LEVELS = FreeLevels(0.02, 40.0, 2e-6, 2e-3, 0.05, 4.0, 6.0, 10.0, 2e-6, 5.0, 0.1)
 SECONDS = np.arange(480.0)
 
 

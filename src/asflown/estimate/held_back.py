@@ -18,7 +18,7 @@ import numpy as np
 from scipy import linalg
 
 from ..kit.ensemble import gains, whiten
-from .latent import ROWS, Body, Levels, Series, arrange, step_of
+from .latent import ROWS, Body, Levels, Series, arrange, channel_of, step_of
 from .levels import fit_levels
 
 #: Length of a block held back, and how many blocks apart those held back at the same time are. [s]
@@ -50,15 +50,15 @@ def predict(body: Body, levels: Levels, series: list[Series], held: list[np.ndar
     white = linalg.solve_triangular(L, X.T @ g.own, lower=True)
     root = linalg.solve_triangular(L, np.eye(len(which)), lower=True)  # covariance = root' root
     error, sigma = root.T @ white, np.sqrt(np.sum(root**2, axis=0))
-    return HeldBack(data.row[which][::-1], times.seconds[step][::-1], (error / sigma)[::-1], white[::-1])
+    return HeldBack(channel_of(times, data)[which][::-1], times.seconds[step][::-1], (error / sigma)[::-1], white[::-1])
 
 
 def hold_back(body: Body, series: list[Series], held: list[np.ndarray], levels: Levels | None = None) -> HeldBack:
     """Predict the samples where ``held``, (N,) bool for each series, with ``levels``, or levels fitted to the others.
 
     Samples which that fit leaves out as outliers do not predict; held-back ones are all judged."""
-    rest = [replace(s, seconds=s.seconds[~h], values=s.values[~h]) for s, h in zip(series, held, strict=True)]
-    asked = [replace(s, seconds=s.seconds[h], values=s.values[h]) for s, h in zip(series, held, strict=True) if h.any()]
+    rest = [s.where(~h) for s, h in zip(series, held, strict=True)]
+    asked = [s.where(h) for s, h in zip(series, held, strict=True) if h.any()]
     if levels is None:
         fit = fit_levels(body, rest)
         levels, rest = fit.levels, list(fit.series)

@@ -23,29 +23,47 @@ from ..kit.smoother import Measurements, Model, Smoothed, discretize
 #: Rows of every model's H, by what is measured.
 ROWS = ("attitude_error", "body_rate", "momentum", "control_torque")
 ATTITUDE_ERROR, BODY_RATE, MOMENTUM, CONTROL_TORQUE = range(4)
+#: A step between neighbours this many times the usual one is a jump.
+_A_JUMP = 8.0
 
 
 @dataclass(frozen=True)
 class Series:
-    """One measured series of one axis: its row, seconds from the grid's start, values, its smallest step."""
+    """One measured series of one axis: its row, seconds from the grid's start, values, its smallest step.
+
+    ``steep``: (N,), how fast the value changes where it jumps, 0 elsewhere [unit/s]; None: it never does."""
 
     row: int
     seconds: np.ndarray
     values: np.ndarray
     quantum: float = 0.0
+    steep: np.ndarray | None = None
+
+    def where(self, keep: np.ndarray) -> Series:
+        steep = None if self.steep is None else self.steep[keep]
+        return replace(self, seconds=self.seconds[keep], values=self.values[keep], steep=steep)
+
+    def with_jumps(self) -> Series:
+        """The same, its jumps marked: there an uncertain instant within the cadence is worth more than the noise."""
+        step, dt = np.abs(np.diff(self.values)), np.diff(self.seconds)
+        rate = np.where(step > _A_JUMP * max(1.4826 * float(np.median(step)), self.quantum), step / dt, 0.0)
+        steep = np.maximum(np.append(rate, 0.0), np.append(0.0, rate))
+        return replace(self, steep=steep if steep.any() else None)
 
     def later(self, seconds: float) -> Series:
         """The same values taken to be measured later."""
         return replace(self, seconds=self.seconds + seconds)
 
     def between(self, start_s: float, stop_s: float) -> Series:
-        inside = (self.seconds >= start_s) & (self.seconds <= stop_s)
-        return replace(self, seconds=self.seconds[inside], values=self.values[inside])
+        return self.where((self.seconds >= start_s) & (self.seconds <= stop_s))
 
 
 @dataclass(frozen=True)
 class Times:
-    """The instants of a pass, every sample's and those wanted beside them, and the size of what was measured."""
+    """The instants of a pass, every sample's and those wanted beside them, and the size of what was measured.
+
+    A sample at a jump has a row of its own, after those of the channels: ``base`` is the channel of every row,
+    ``steep`` how fast the value changes there."""
 
     seconds: np.ndarray  # (N,)
     steps_s: np.ndarray  # the different steps
@@ -53,6 +71,8 @@ class Times:
     wanted: np.ndarray  # (N,) bool
     largest: np.ndarray  # (rows,), of each row's values; 0 where there are none
     quantum: np.ndarray  # (rows,)
+    base: np.ndarray  # (rows and jumps,)
+    steep: np.ndarray  # (rows and jumps,)
 
 
 def arrange(series, wanted_s: np.ndarray | None = None) -> tuple[Times, Measurements]:
@@ -63,6 +83,10 @@ def arrange(series, wanted_s: np.ndarray | None = None) -> tuple[Times, Measurem
     place = np.concatenate([np.searchsorted(ms, e) for e in everything])
     row = np.concatenate([np.full(len(s.values), s.row) for s in series])
     value = np.concatenate([s.values for s in series])
+    steep = np.concatenate([np.zeros(len(s.values)) if s.steep is None else s.steep for s in series])
+    jumps = np.flatnonzero(steep)
+    base = np.concatenate([np.arange(len(ROWS)), row[jumps]])
+    row[jumps] = len(ROWS) + np.arange(len(jumps))
     order = np.argsort(place, kind="stable")
     start = np.searchsorted(place[order], np.arange(len(ms) + 1))
     steps, which = np.unique(np.diff(ms), return_inverse=True)
@@ -71,8 +95,22 @@ def arrange(series, wanted_s: np.ndarray | None = None) -> tuple[Times, Measurem
         largest[s.row] = max(largest[s.row], float(np.max(np.abs(s.values), initial=0.0)))
         quantum[s.row] = max(quantum[s.row], s.quantum)
     first = np.concatenate([[0], which])
-    times = Times(ms / 1e3, steps / 1e3, first, np.isin(ms, extra), largest, quantum)
+    times = Times(
+        ms / 1e3,
+        steps / 1e3,
+        first,
+        np.isin(ms, extra),
+        largest,
+        quantum,
+        base,
+        np.concatenate([np.zeros(len(ROWS)), steep[jumps]]),
+    )
     return times, Measurements(start, row[order], value[order])
+
+
+def channel_of(times: Times, data: Measurements) -> np.ndarray:
+    """The row in ROWS of each measurement, at a jump or not. (M,)"""
+    return times.base[data.row]
 
 
 def step_of(data: Measurements) -> np.ndarray:
@@ -131,6 +169,10 @@ class Body:
         """Standard deviation of every state but the torque's two at the first instant."""
         raise NotImplementedError
 
+    def timing_s(self, v) -> float:
+        """One sigma of a sample's instant."""
+        return 0.0
+
     def starting_levels(self, series):
         """Levels to start a fit from, from the series alone."""
         raise NotImplementedError
@@ -158,7 +200,7 @@ class Body:
         first = size[0] / self.inertia_kgm2 * (10 if self.wiener else 1)
         deviation = np.concatenate([self.start(v, times), [first, k * first]])
         H, white = self.measured(v)
-        R = white**2 + times.quantum**2 / 12
+        H, R = H[times.base], (white**2 + times.quantum**2 / 12)[times.base] + (self.timing_s(v) * times.steep) ** 2
         return Model(
             A, fixed, driven, size[:, None] ** 2, times.which, H, R, np.zeros(self.STATES), np.diag(deviation**2)
         )

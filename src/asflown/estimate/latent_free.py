@@ -22,7 +22,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..kit.smoother import Measurements, Smoothed
-from .latent import BODY_RATE, CONTROL_TORQUE, MOMENTUM, ROWS, Body, Levels, Times, step_of
+from .latent import BODY_RATE, CONTROL_TORQUE, MOMENTUM, ROWS, Body, Levels, Times, channel_of, step_of
 from .latent_loop import usual_size, white_noise
 
 _RATE, _STORED, _FREE, _FREE_SLOPE, _ANGLE, _HELD, _ERROR, _TORQUE, _STATES = 0, 1, 2, 3, 4, 5, 6, 7, 9
@@ -40,6 +40,7 @@ class FreeLevels(Levels):
     turning_s: float
     rate_slow_rad_s: float
     rate_time_s: float
+    timing_s: float  # of a sample's instant: what a reading at a jump is uncertain by
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +51,7 @@ class FreeBody(Body):
     RATE: ClassVar[int] = _RATE
     STORED: ClassVar[int] = _STORED
     # lengths of a torque: from a thruster's seconds to an orbit
-    SPREAD: ClassVar[tuple[float, ...]] = (1.5, 1.2, 0.7, 0.7, 1.5, 1.0, 1.0, 1.0, 1.0, 1.0)
+    SPREAD: ClassVar[tuple[float, ...]] = (1.5, 1.2, 0.7, 0.7, 1.5, 1.0, 1.0, 1.0, 1.0, 1.0, 0.7)
     # A likelihood of 1e4 and more is rounded to 1e-7 (gains are reused): the usual step of 1e-8 measures noise, and of
     # ten levels the search stops anywhere.
     SEARCH: ClassVar[tuple[float, ...]] = (1e-3, 1e-4, 1e-6)
@@ -83,7 +84,7 @@ class FreeBody(Body):
         at = best.mean[step_of(data)]
 
         def on(row: int, values) -> np.ndarray:
-            return np.where(data.row == row, values, 0.0)
+            return np.where(channel_of(times, data) == row, values, 0.0)
 
         return {
             "inertia": on(BODY_RATE, -at[:, _RATE]),
@@ -106,6 +107,9 @@ class FreeBody(Body):
         angle = 3 * (v.torque_Nm + v.reaction_Nm) / self.inertia_kgm2 * v.damping_s * v.turning_s
         return np.array([rate, stored, push, push, angle, rate, v.rate_slow_rad_s])
 
+    def timing_s(self, v: FreeLevels) -> float:
+        return v.timing_s
+
     def starting_levels(self, series) -> FreeLevels:
         rate = next(s for s in series if s.row == BODY_RATE)
         actuator = next(s for s in series if s.row != BODY_RATE)
@@ -126,4 +130,5 @@ class FreeBody(Body):
             turning_s=15.0,
             rate_slow_rad_s=white,
             rate_time_s=5.0,
+            timing_s=0.1 * float(np.median(np.diff(actuator.seconds))),
         )

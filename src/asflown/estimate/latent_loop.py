@@ -22,7 +22,7 @@ import numpy as np
 from ..craft.model import WheelController
 from ..kit.regression import noise_sigma
 from ..kit.smoother import Measurements, Smoothed
-from .latent import ATTITUDE_ERROR, BODY_RATE, MOMENTUM, ROWS, Body, Levels, Series, Times, response
+from .latent import ATTITUDE_ERROR, BODY_RATE, MOMENTUM, ROWS, Body, Levels, Series, Times, channel_of, response
 
 _ATTITUDE, _RATE, _FILTER, _STORED, _ERROR, _TORQUE, _STATES = 0, 1, 2, 6, 7, 8, 10
 
@@ -88,7 +88,7 @@ class HeldBody(Body):
         """The torque's own answer under other numbers; per unit inertia the loop has the craft's own gains."""
         torque = self.inertia_kgm2 * best.mean[:, _TORQUE]
         here = response(self, v, times, data, torque)
-        stored = data.row == MOMENTUM
+        stored = channel_of(times, data) == MOMENTUM
         changes = {
             "kp": (0.01, replace(self, kp_per_s=1.01 * self.kp_per_s)),
             "kd": (0.01, replace(self, kd_per_s=1.01 * self.kd_per_s)),

@@ -6,13 +6,13 @@ what the data say nothing about near where the channels themselves put it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import optimize
 
 from ..kit.smoother import Measurements, log_likelihood, smooth
-from .latent import ROWS, Body, Known, Levels, Series, Times, arrange, step_of, without_known
+from .latent import ROWS, Body, Known, Levels, Series, Times, arrange, channel_of, step_of, without_known
 
 #: A sample that all the others contradict by more than this is left out; the most that may be. [sigma]
 OUTLYING, _MOST_OUTLYING = 5.0, 0.1
@@ -157,12 +157,12 @@ def _offsets(body: Body, levels: Levels, series, known: Known | None) -> dict[st
 
 
 def _without(series, times: Times, data: Measurements, bad: np.ndarray) -> list[Series]:
-    step = step_of(data)
+    step, row = step_of(data), channel_of(times, data)
     kept = []
     for s in series:
-        drop = times.seconds[step[bad[data.row[bad] == s.row]]]
+        drop = times.seconds[step[bad[row[bad] == s.row]]]
         keep = ~np.isin(np.round(s.seconds * 1e3), np.round(drop * 1e3))
-        kept.append(replace(s, seconds=s.seconds[keep], values=s.values[keep]))
+        kept.append(s.where(keep))
     return kept
 
 

@@ -83,6 +83,8 @@ def gather(subject: Subject, axes: tuple[int, ...], loop: str | None, motion: Mo
         count = np.sqrt(sum((c.count_size * d) ** 2 for c, d in stored))  # of the sum: quanta add as variances do
         for j in axes:
             series[j].append(Series(MOMENTUM, t, h[:, j] - start[j], float(count[j])))
+    if not modelled:  # where wheels stick and tear loose, instants within the cadence begin to matter
+        series = {j: [s.with_jumps() for s in of_axis] for j, of_axis in series.items()}
     silent = {g: c.name for c in everything for g in gaps_on_grid(c, grid)}
     doubts += [
         d.replace("are left null", "are bridged by the model, the band widened") for d in gap_doubts(tlm, grid, silent)

@@ -27,7 +27,7 @@ from ..telemetry.channels import AXES
 from .corners import COARSEST_S, draw_torques, spacing_s
 from .curves import gaussian_torque, widened
 from .innovations import UNEXPLAINED, Innovations, by_channel, considered_doubts, innovation_doubts
-from .latent import Body, Times, arrange, without_known
+from .latent import Body, Times, arrange, channel_of, without_known
 from .latent_free import FreeBody
 from .latent_loop import HeldBody
 from .levels import AxisFit, fit_doubts, fit_levels
@@ -218,7 +218,7 @@ def _solve(
             "the model cannot be fitted to this record: its covariance lost its meaning",
             remedy="Look for values of impossible size (asflown telemetry check), or use --method momentum.",
         )
-    innovations = by_channel(post.whitened, data.row)
+    innovations = by_channel(post.whitened, channel_of(times, data))
     shares = {n: considered[n] for n in names}
     off = {
         n: (s * float(c.mean()), s * float(c.std()))
