@@ -1,11 +1,10 @@
 """Do the fused method's bands hold on what it never saw of two real recordings?
 
 Run: python studies/held_back.py (6 minutes).  The recordings are looked for in $ASFLOWN_FLIGHT_DATA, else in
-../shared/data; one that is missing is named and skipped.  Answer, 2026-11: for blocks of the Space Station and of
-INSPIRESat-1's z, yes: whitened pulls of size 0.99 to 1.07.  About INSPIRESat-1's x and y a wheel sticks, and 1 % of
-the samples lie beyond 5 sigma: 1.21 to 1.63 with them, 1.01 to 1.16 without.  Whole channels hold (0.88 to 1.25) with
-the levels of the whole record, not always with those of the rest (0.61 to 3.0): a minute or six of a channel do not
-say how it will behave for the rest of the record.
+../shared/data; one that is missing is named and skipped.  Answer, 2026-11: for blocks, yes:
+whitened pulls of size 0.99 to 1.07 for the Space Station and INSPIRESat-1's z, 1.04 to 1.14 about x and y, where wheels
+stick and tear loose.  Whole channels hold (0.88 to 1.10) with the levels of the whole record, not always with those
+of the rest (0.61 to 1.9): a minute or six of a channel do not say how it will behave for the rest of the record.
 
 Held back are blocks of 60 s, of one channel or of all of an axis, every fourth at once, the levels fitted to the
 rest; and a whole channel but its first 60 s (the Space Station: but 180 s at both ends), with the levels of the rest
