@@ -48,6 +48,8 @@ def torque(
     json: bool = JSON,
 ) -> None:
     """Reconstruct the disturbance torque on the body from telemetry."""
+    from rich.console import Console
+
     from asflown.estimate.compare import compare_torques
     from asflown.estimate.torque import disturbance_torque
 
@@ -55,20 +57,23 @@ def torque(
     ship = craft_from(craft, inertia, cm)
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
     mechanism = None if moving == "none" else moving
-    result = disturbance_torque(
-        telemetry,
-        ship,
-        method=method,
-        variant=variant,
-        axis=axis,
-        model=model,
-        order=order,
-        window_s=window,
-        prior=prior,
-        loop=loop,
-        considered=_sigmas(consider),
-        moving=mechanism,
-    )
+    considered = _sigmas(consider)
+    # seconds for an event, minutes for an orbit at 1 Hz: say that something happens, to a terminal only
+    with Console(stderr=True).status("fitting and smoothing", spinner="line"):
+        result = disturbance_torque(
+            telemetry,
+            ship,
+            method=method,
+            variant=variant,
+            axis=axis,
+            model=model,
+            order=order,
+            window_s=window,
+            prior=prior,
+            loop=loop,
+            considered=considered,
+            moving=mechanism,
+        )
     if impulse is not None:
         result = _with_impulse(result, impulse)
     comparisons, others = [], []
