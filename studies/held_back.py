@@ -2,7 +2,7 @@
 
 Run: python studies/held_back.py (6 minutes).  The recordings are looked for in $ASFLOWN_FLIGHT_DATA, else in
 ../shared/data; one that is missing is named and skipped.  Answer, 2026-11: for blocks, yes:
-whitened pulls of size 0.99 to 1.07 for the Space Station and INSPIRESat-1's z, 1.04 to 1.14 about x and y, where wheels
+whitened pulls of size 0.99 to 1.07 for the Space Station and INSPIRESat-1's z, 1.02 to 1.14 about x and y, where wheels
 stick and tear loose.  Whole channels hold (0.88 to 1.10) with the levels of the whole record, not always with those
 of the rest (0.61 to 1.9): a minute or six of a channel do not say how it will behave for the rest of the record.
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass, fields, replace
 from typing import ClassVar
 
 import numpy as np
+from scipy import ndimage
 
 from ..kit.ensemble import respond
 from ..kit.smoother import Measurements, Model, Smoothed, discretize
@@ -23,7 +24,7 @@ from ..kit.smoother import Measurements, Model, Smoothed, discretize
 #: Rows of every model's H, by what is measured.
 ROWS = ("attitude_error", "body_rate", "momentum", "control_torque")
 ATTITUDE_ERROR, BODY_RATE, MOMENTUM, CONTROL_TORQUE = range(4)
-#: A step between neighbours this many times the usual one is a jump.
+#: A step this many times as far from its neighbours as is usual is a jump.
 _A_JUMP = 8.0
 
 
@@ -44,9 +45,12 @@ class Series:
         return replace(self, seconds=self.seconds[keep], values=self.values[keep], steep=steep)
 
     def with_jumps(self) -> Series:
-        """The same, its jumps marked: there an uncertain instant within the cadence is worth more than the noise."""
-        step, dt = np.abs(np.diff(self.values)), np.diff(self.seconds)
-        rate = np.where(step > _A_JUMP * max(1.4826 * float(np.median(step)), self.quantum), step / dt, 0.0)
+        """The same, its jumps marked: there an uncertain instant within the cadence is worth more than the noise.
+
+        A jump is a step far from those around it; a steady rise has none."""
+        step, dt = np.diff(self.values), np.diff(self.seconds)
+        odd = np.abs(step - ndimage.median_filter(step, 5))
+        rate = np.where(odd > _A_JUMP * max(1.4826 * float(np.median(odd)), self.quantum), odd / dt, 0.0)
         steep = np.maximum(np.append(rate, 0.0), np.append(0.0, rate))
         return replace(self, steep=steep if steep.any() else None)
 

@@ -51,7 +51,7 @@ class FreeBody(Body):
     RATE: ClassVar[int] = _RATE
     STORED: ClassVar[int] = _STORED
     # lengths of a torque: from a thruster's seconds to an orbit
-    SPREAD: ClassVar[tuple[float, ...]] = (1.5, 1.2, 0.7, 0.7, 1.5, 1.0, 1.0, 1.0, 1.0, 1.0, 0.7)
+    SPREAD: ClassVar[tuple[float, ...]] = (1.5, 1.2, 0.7, 0.7, 1.5, 1.0, 1.0, 1.0, 1.0, 1.0, 1.5)
     # A likelihood of 1e4 and more is rounded to 1e-7 (gains are reused): the usual step of 1e-8 measures noise, and of
     # ten levels the search stops anywhere.
     SEARCH: ClassVar[tuple[float, ...]] = (1e-3, 1e-4, 1e-6)
@@ -130,5 +130,5 @@ class FreeBody(Body):
             turning_s=15.0,
             rate_slow_rad_s=white,
             rate_time_s=5.0,
-            timing_s=0.1 * float(np.median(np.diff(actuator.seconds))),
+            timing_s=0.02 * float(np.median(np.diff(actuator.seconds))),  # good stamps, unless the data say otherwise
         )
