@@ -25,6 +25,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # a process a core; threads of each would only wait for one another
 
 import numpy as np
+from scipy import signal
 
 from asflown import disturbance_torque, fly, load_craft
 from asflown.estimate.compare import best_lag
@@ -33,6 +34,7 @@ from asflown.estimate.curves import gaussian_torque
 from asflown.estimate.latent import Series, arrange, step_of
 from asflown.estimate.latent_loop import HeldBody, LoopLevels
 from asflown.estimate.levels import fit_levels
+from asflown.estimate.result import PEAK_REACH_S
 from asflown.kit.ensemble import simulate
 from asflown.kit.errors import BadInput
 from asflown.kit.smoother import smooth
@@ -99,6 +101,16 @@ def corners_of(time_s, torque) -> np.ndarray:
     return time_s[bends]
 
 
+def peaks_of(flight) -> list[tuple[float, float]]:
+    """Times and heights of the true peaks about y: of triangles as they were made, of a curve its large extremes."""
+    if flight.truth.peaks:
+        return [(t, v) for t, v, _ in flight.truth.peaks]
+    t, torque = flight.truth.time_s, flight.truth.torque_Nm[:, 1]
+    large = 0.4 * np.max(np.abs(torque))
+    at = [k for s in (1, -1) for k in signal.find_peaks(s * torque, height=large, prominence=large)[0]]
+    return [(float(t[k]), float(torque[k])) for k in at]
+
+
 def one(job) -> dict:
     profile, condition, seed = job
     flight, craft = flown(profile, condition, seed)
@@ -118,7 +130,9 @@ def one(job) -> dict:
         error = r.torque_Nm[:, 1] - true
         found[name] = float(np.sqrt(np.nanmean(error**2)))
         if name == "fused":
-            found |= judged(r, true, error, [(a, v) for a, v, _ in flight.truth.peaks], corners_of(t, torque))
+            found |= judged(
+                r, true, error, peaks_of(flight), corners_of(t, torque) if flight.truth.peaks else np.empty(0)
+            )
     return found
 
 
@@ -133,10 +147,11 @@ def judged(r, true, error, peaks, corners) -> dict:
         inside[f"sigma_{name}"] = np.abs(error) < sigmas * sigma
     found = {k: float(np.mean(v)) for k, v in inside.items()}
     found["lag"] = best_lag(r.time_s, true, r.time_s, r.torque_Nm[:, 1])[0]
-    if peaks:  # triangles: their corners are known; a cover's curve has none
+    if len(corners):
         near = np.min(np.abs(r.time_s[:, None] - corners), axis=1) <= _CORNER_S
         found |= {f"corner_{k}": float(np.mean(inside[f"{k}_95"][near])) for k in ("band", "sigma")}
-        figures = [(*r.peak_height(a, 8.0, "y"), v) for a, v in peaks]
+    if peaks:
+        figures = [(*r.peak_height(a, PEAK_REACH_S, "y"), v) for a, v in peaks]
         found["peak_percent"] = float(np.mean([100 * (h / v - 1) for h, _, v in figures]))
         found["peak_sigma_percent"] = float(np.mean([100 * s / abs(v) for _, s, v in figures]))
         found["peak_95"] = float(np.mean([abs(h - v) < 1.96 * s for h, s, v in figures]))
