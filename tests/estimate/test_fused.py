@@ -367,6 +367,15 @@ def test_priors_and_considered_quantities_can_be_chosen():
             fused(flight.telemetry, **how)
 
 
+def test_a_long_record_is_smoothed_and_says_so():
+    flight = fly("quiet", seed=1, duration="7000 s", telemetry={"attitude_error": "4 s"})
+    r = fused(flight.telemetry)
+    assert r.settings["prior"] == "matern" and any("too long to look for corners" in d for d in r.doubts)
+    assert np.sqrt(np.mean(r.torque_Nm[:, 1] ** 2)) < 1e-4
+    with pytest.raises(BadInput, match="too long"):
+        fused(flight.telemetry, prior="edges")
+
+
 def test_a_peak_has_a_sigma_that_holds():
     pulls = []
     for seed in range(4):

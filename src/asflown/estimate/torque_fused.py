@@ -83,14 +83,18 @@ def fused(
     ``prior``: one of PRIORS, or None: edges, but matern in a record too long for it.  ``loop``: one of
     records.LOOPS, or None: modelled where it can be.  ``considered``: in place of some of CONSIDERED.
 
-    Raises BadInput where body rates, actuators or inertia are missing, and what ``records.gather`` raises."""
+    Raises BadInput where body rates, actuators or inertia are missing, for edges in a record of more than 100
+    minutes (at 1 s), and what ``records.gather`` raises."""
     known = CONSIDERED | (considered or {})
     I_B = subject.known_inertia()
     record = gather(subject, axes, loop)
     doubts = list(record.doubts)
+    too_long = _too_long_for_corners(record.grid)
+    if prior == "edges" and too_long:
+        raise BadInput(too_long, remedy="Narrow it with --start and --stop, or use --prior matern.")
     if prior is None:
-        prior, why = _prior_for(record.grid)
-        doubts += why
+        prior = "matern" if too_long else "edges"
+        doubts += [f"{too_long}: a smooth torque is taken, which rounds sharp ones"] if too_long else []
     bodies = {j: _body(subject, record, I_B[j, j], prior == "wiener") for j in record.series}
     fits = {j: fit_levels(bodies[j], record.series[j]) for j in bodies}
     motion = _motion(bodies, fits, record)
@@ -104,9 +108,8 @@ def fused(
         doubts.append(
             "w x H and the products of inertia are not taken off, since not all axes have body rates: they are in the torque"
         )
-    turning = motion.rate_variance @ (
-        np.mean(H**2, axis=0) * (1 - np.eye(3))
-    )  # of w x H: the size of H is what matters
+    # of w x H: the size of H is what matters
+    turning = motion.rate_variance @ (np.mean(H**2, axis=0) * (1 - np.eye(3)))
     seeds = np.random.default_rng(seed).spawn(3)
     torque, sigma, momentum = np.full((3, record.grid.count, 3), np.nan)
     paths = np.full((PATHS, record.grid.count, 3), np.nan)
@@ -129,14 +132,12 @@ def fused(
     return record.grid, torque, sigma, momentum, settings, doubts, paths
 
 
-def _prior_for(grid: Grid) -> tuple[str, list[str]]:
+def _too_long_for_corners(grid: Grid) -> str:
+    """What there is against looking for corners; '' where there is nothing."""
     duration = float(grid.seconds[-1])
     if spacing_s(duration, grid.step_s) <= max(COARSEST_S, grid.step_s):
-        return "edges", []
-    return "matern", [
-        f"the record of {duration:.0f} s is too long to look for corners in: a smooth torque is taken, which rounds sharp ones; "
-        "narrow it with --start and --stop"
-    ]
+        return ""
+    return f"the record of {duration:.0f} s is too long to look for corners in"
 
 
 def _body(subject: Subject, record: Record, inertia_kgm2: float, wiener: bool) -> Body:
