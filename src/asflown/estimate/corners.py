@@ -39,8 +39,10 @@ _CORNER_PRIOR = (1.0, 20.0)
 #: Most candidate instants; a longer record has them further apart, to at most _COARSEST_S. [s]
 _CANDIDATES, COARSEST_S = 1200, 5.0
 #: Proposals for each candidate instant, the fewest in all, and the share thrown away.
-_PROPOSALS, _LEAST_PROPOSALS, _BURN_IN = 100, 30_000, 0.4
+_PROPOSALS, _LEAST_PROPOSALS, _BURN_IN = 50, 30_000, 0.4
 _MOST_CORNERS = 160
+#: Chains whose draws are put together: one alone may stay with few corners and much roughness, or many and little.
+_CHAINS = 4
 #: Innovations whose mean square is above 1 by this many standard errors are not explained. [sigma]
 _UNEXPLAINED = 5.0
 #: A column of which less than this share is its own, beside those already in the set, is refused: rounding would decide.
@@ -79,7 +81,7 @@ def draw_torques(
     of_torque = np.r_[0, 1, fixed : len(begin)]
     proposals = max(_LEAST_PROPOSALS, _PROPOSALS * len(candidates))
 
-    def chain(grams, share, proposals, corners=np.empty(0, np.int64)):
+    def chain(grams, share, proposals, count=count, corners=np.empty(0, np.int64)):
         G, b, evidence = (np.array(x) for x in zip(*grams, strict=True))
         return _sample(
             G, b, evidence, np.log(share), always, slope**2, np.array(_CORNER_PRIOR), BEND_FREEDOM,
@@ -98,7 +100,9 @@ def draw_torques(
     size = np.sqrt(gaussian_filter1d(np.mean((first @ basis.T) ** 2, axis=0), _NEARBY_S / _step(times), mode="nearest"))
     ways = [plain, *[whitened(r * size) for r in ROUGHNESS], whitened(levels.torque_Nm, levels.length_s)]
     for effort in (1, 10):
-        bends, corners, which = chain([gram for _, gram in ways], np.array(_PRIOR), effort * proposals, found)
+        grams, kept = [gram for _, gram in ways], -(-count // _CHAINS)
+        drawn = [chain(grams, np.array(_PRIOR), effort * proposals, kept, found) for _ in range(_CHAINS)]
+        bends, corners, which = (np.concatenate(x)[:count] for x in zip(*drawn, strict=True))
         usual = int(np.bincount(which).argmax())
         g = ways[usual][0]
         left = g.own - whiten(g, seen @ bends[which == usual].mean(axis=0)[:, None])[:, 0]
