@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..craft.model import Craft
-from ..estimate.result import AXES, TorqueResult
+from ..estimate.result import AXES, PEAK_REACH_S, TorqueResult
 from ..estimate.torque import METHODS, VARIANTS, disturbance_torque
 from ..estimate.truth import against_truth
 from ..kit.errors import BadInput, some_of
@@ -22,8 +22,8 @@ from ..sim.scenario import Scenario, load_scenario
 #: A method by name: its own, corrected, or with "-printed".
 DEFAULT_METHODS = ("momentum-printed", "transfer-printed", "momentum", "transfer", "fused")
 
-#: Within this of a true peak counts as at the corner; within this a peak's own figure is looked for. [s]
-_CORNER_S, _PEAK_S = 2.0, 5.0
+#: Within this of a true peak counts as at the corner. [s]
+_CORNER_S = 2.0
 _SIGMAS = {0.68: 1.0, 0.95: 1.96}
 
 
@@ -145,7 +145,7 @@ def _judge(result: TorqueResult, flight, axis: str) -> dict:
             near = np.min(np.abs(result.time_s[:, None] - [t for t, _ in peaks]), axis=1) <= _CORNER_S
             sample["corner"] = np.mean(inside[0.95][near])
         if peaks and result.paths_Nm is not None:
-            figures = [(*result.peak_height(t, _PEAK_S, axis), v) for t, v in peaks]
+            figures = [(*result.peak_height(t, PEAK_REACH_S, axis), v) for t, v in peaks]
             sample["peak95"] = np.mean([s is not None and abs(h - v) < 1.96 * s for h, s, v in figures])
     return sample
 
