@@ -36,7 +36,7 @@ ROUGH_LENGTH_S, _NEARBY_S = 4.0, 10.0
 BEND_FREEDOM = 1.0
 #: Beta prior of the share of instants that are corners: one in twenty, to a factor of e.
 _CORNER_PRIOR = (1.0, 20.0)
-#: Most candidate instants; a longer record has them further apart, to at most _COARSEST_S. [s]
+#: Most candidate instants; a longer record has them further apart, to at most COARSEST_S. [s]
 _CANDIDATES, COARSEST_S = 1200, 5.0
 #: Proposals for each candidate instant, the fewest in all, and the share thrown away.
 _PROPOSALS, _LEAST_PROPOSALS, _BURN_IN = 50, 30_000, 0.4
@@ -81,8 +81,8 @@ def draw_torques(
     of_torque = np.r_[0, 1, fixed : len(begin)]
     proposals = max(_LEAST_PROPOSALS, _PROPOSALS * len(candidates))
 
-    def chain(grams, share, proposals, count=count, corners=np.empty(0, np.int64)):
-        G, b, evidence = (np.array(x) for x in zip(*grams, strict=True))
+    def chain(grams, share, proposals, count, corners):
+        G, b, evidence = grams
         return _sample(
             G, b, evidence, np.log(share), always, slope**2, np.array(_CORNER_PRIOR), BEND_FREEDOM,
             proposals, int(_BURN_IN * proposals), count, _MOST_CORNERS, corners, rng,
@@ -93,14 +93,17 @@ def draw_torques(
         X = whiten(g, seen, begin)
         return g, (X.T @ X, X.T @ g.own, g.log_likelihood)
 
+    def stacked(ways):
+        return tuple(np.array(x) for x in zip(*(gram for _, gram in ways), strict=True))
+
     plain = whitened(np.zeros(len(t)))
-    first, _, _ = chain([plain[1]], np.ones(1), proposals)
+    first, _, _ = chain(stacked([plain]), np.ones(1), proposals, count, np.empty(0, np.int64))
     found = fixed + np.flatnonzero(first[-1, fixed:])
     first = first[:, of_torque]
     size = np.sqrt(gaussian_filter1d(np.mean((first @ basis.T) ** 2, axis=0), _NEARBY_S / _step(times), mode="nearest"))
     ways = [plain, *[whitened(r * size) for r in ROUGHNESS], whitened(levels.torque_Nm, levels.length_s)]
+    grams, kept = stacked(ways), -(-count // _CHAINS)
     for effort in (1, 10):
-        grams, kept = [gram for _, gram in ways], -(-count // _CHAINS)
         drawn = [chain(grams, np.array(_PRIOR), effort * proposals, kept, found) for _ in range(_CHAINS)]
         bends, corners, which = (np.concatenate(x)[:count] for x in zip(*drawn, strict=True))
         usual = int(np.bincount(which).argmax())

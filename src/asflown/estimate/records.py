@@ -29,13 +29,15 @@ class Record:
     """The series of every axis that can be solved, seconds from the grid's start.
 
     ``loop``: whether the controller is modelled, or what the actuators do only measured; ``pushed``: they are
-    known by their torque, not their momentum; ``start_Nms``: their momentum (3,), taken off the series."""
+    known by their torque, not their momentum; ``start_Nms``: their momentum (3,), taken off the series;
+    ``together``: whether all actuators are read at the same instants."""
 
     grid: Grid
     loop: str
     pushed: bool
     series: dict[int, list[Series]]
     start_Nms: np.ndarray
+    together: bool
     doubts: list[str]
 
 
@@ -76,9 +78,9 @@ def gather(subject: Subject, axes: tuple[int, ...], loop: str | None, motion: Mo
     series: dict[int, list[Series]] = {j: [] for j in axes}
     for (row, j), c in channels.items():
         series[j].append(_series(row, c, grid))
-    start = np.zeros(3)
+    start, together = np.zeros(3), True
     if stored:
-        t, h = _momentum(stored, grid, doubts, motion)
+        t, h, together = _momentum(stored, grid, doubts, motion)
         start = h[0].copy()
         count = np.sqrt(sum((c.count_size * d) ** 2 for c, d in stored))  # of the sum: quanta add as variances do
         for j in axes:
@@ -89,7 +91,7 @@ def gather(subject: Subject, axes: tuple[int, ...], loop: str | None, motion: Mo
     doubts += [
         d.replace("are left null", "are bridged by the model, the band widened") for d in gap_doubts(tlm, grid, silent)
     ]
-    return Record(grid, "modelled" if modelled else "measured", bool(pushed), series, start, doubts)
+    return Record(grid, "modelled" if modelled else "measured", bool(pushed), series, start, together, doubts)
 
 
 def _loop_unknown(subject: Subject, axes, pushed: bool) -> tuple[str, str] | None:
@@ -135,7 +137,7 @@ def _series(row: int, channel: Channel, grid: Grid) -> Series:
 
 
 def _momentum(stored, grid: Grid, doubts: list[str], motion: Motion | None):
-    """Stored momentum in body axes at the sample times all actuators share, or at those of the first."""
+    """Stored momentum in body axes at the sample times all actuators share, or at those of the first; and whether they share them."""
     lead = stored[0][0].usable
     common = lead.tai_ns
     for c, _ in stored[1:]:
@@ -147,7 +149,7 @@ def _momentum(stored, grid: Grid, doubts: list[str], motion: Motion | None):
         for c, direction in stored:
             u = c.usable
             h += np.outer(u.values[np.searchsorted(u.tai_ns, common)], direction)
-        return grid.of(common), h
+        return grid.of(common), h, True
     times = grid.of(lead.tai_ns)
     times = times[(times >= 0) & (times <= grid.seconds[-1])]
     if motion is None:
@@ -159,7 +161,7 @@ def _momentum(stored, grid: Grid, doubts: list[str], motion: Motion | None):
     else:
         h = _carried(stored, grid, times, motion)
     known = np.isfinite(h).all(axis=1)
-    return times[known], h[known]
+    return times[known], h[known], False
 
 
 def _carried(stored, grid: Grid, times: np.ndarray, motion: Motion) -> np.ndarray:

@@ -17,7 +17,7 @@ share, which a one-axis model would take for a disturbance; a second pass solves
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -161,31 +161,29 @@ def _motion(bodies: dict[int, Body], fits: dict[int, AxisFit], record: Record) -
             stored[:, j] = record.start_Nms[j] + body.inertia_kgm2 * x[:, body.STORED]
     sound = np.isfinite(rate).all() and np.isfinite(acceleration).all() and variance.min() >= 0
     if not sound:
-        raise BadInput(
-            "the model cannot be fitted to this record: its covariance lost its meaning",
-            remedy="Look for values of impossible size (asflown telemetry check), or use --method momentum.",
-        )
+        raise _lost()
     return Motion(rate, variance, acceleration, stored)
+
+
+def _lost() -> BadInput:
+    return BadInput(
+        "the model cannot be fitted to this record: its covariance lost its meaning",
+        remedy="Look for values of impossible size (asflown telemetry check), or use --method momentum.",
+    )
 
 
 def _carried(subject: Subject, axes, record: Record, motion: Motion, fits):
     """The fits with the momentum of unsynchronised wheels read anew, each sample carried by the motion."""
-    if not any("sampled at different instants" in d for d in record.doubts):
+    if record.together:
         return fits
     at = record.grid.seconds
 
     def stored(t):
         return np.column_stack([np.interp(t, at, motion.stored_Nms[:, j]) for j in range(3)])
 
-    again = gather(subject, axes, record.loop, stored)
+    again = {j: series[-1] for j, series in gather(subject, axes, record.loop, stored).series.items()}
     return {
-        j: AxisFit(
-            f.levels,
-            tuple(again.series[j][-1] if s.row == again.series[j][-1].row else s for s in f.series),
-            f.left_out,
-            f.offsets,
-        )
-        for j, f in fits.items()
+        j: replace(f, series=tuple(again[j] if s.row == again[j].row else s for s in f.series)) for j, f in fits.items()
     }
 
 
@@ -215,10 +213,7 @@ def _solve(
     if not body.NARROWS:
         post = widened(post, body, fit.levels, times, data, columns, rng)
     if not (np.isfinite(post.paths).all() and np.isfinite(post.mean).all()):
-        raise BadInput(
-            "the model cannot be fitted to this record: its covariance lost its meaning",
-            remedy="Look for values of impossible size (asflown telemetry check), or use --method momentum.",
-        )
+        raise _lost()
     innovations = by_channel(post.whitened, channel_of(times, data))
     shares = {n: considered[n] for n in names}
     off = {
