@@ -18,9 +18,10 @@ MAY_IMPORT = {
     "dynamics": {"kit", "craft"},
     "sim": {"kit", "craft", "telemetry"},
     "estimate": {"kit", "craft", "telemetry", "dynamics"},
-    "plots": {"kit", "craft", "telemetry", "dynamics", "estimate"},
-    "campaigns": {"kit", "craft", "telemetry", "dynamics", "sim", "estimate"},
-    "cli": {"kit", "craft", "telemetry", "dynamics", "sim", "estimate", "plots", "campaigns"},
+    "plots": {"kit", "craft", "telemetry", "dynamics", "estimate", "trends"},
+    "trends": {"kit", "craft", "telemetry", "dynamics", "estimate"},
+    "campaigns": {"kit", "craft", "telemetry", "dynamics", "sim", "estimate", "trends"},
+    "cli": {"kit", "craft", "telemetry", "dynamics", "sim", "estimate", "trends", "plots", "campaigns"},
 }
 
 

@@ -1,0 +1,67 @@
+"""What is kept of one actuation: figures of merit, curves, doubts, and where they came from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Value:
+    """One figure of merit, in SI; ``None`` where it is not known.
+
+    ``basis``: what it was computed from: 'fused', 'momentum, printed', 'transfer, printed' or 'telemetry'."""
+
+    figure: str
+    basis: str
+    value: float | None
+    sigma: float | None
+    unit: str
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A history to overlay: ``time_s`` counts from the motor's start; ``sigma`` None where there is none.
+
+    ``name``: 'torque_y, fused', 'motor_current', 'cover_angle', ...; all arrays (N,), NaN where unknown."""
+
+    name: str
+    unit: str
+    time_s: np.ndarray
+    values: np.ndarray
+    sigma: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One actuation, analysed once; analysed again, it is a further revision.
+
+    ``date``: UTC of the start, as ISO 8601 to the second; ``revision`` and ``added`` (UTC) are the store's."""
+
+    craft: str
+    event: str
+    kind: str
+    date: str
+    motor: str | None = None
+    note: str = ""
+    values: tuple[Value, ...] = ()
+    curves: tuple[Curve, ...] = ()
+    doubts: tuple[str, ...] = ()
+    provenance: dict = field(default_factory=dict)
+    revision: int | None = None
+    added: str | None = None
+
+    @property
+    def day(self) -> float:
+        """Days since 2000-01-01 UTC, to set dates against each other."""
+        moment = datetime.fromisoformat(self.date).replace(tzinfo=UTC)
+        return (moment - datetime(2000, 1, 1, tzinfo=UTC)).total_seconds() / 86400
+
+    def value(self, figure: str, basis: str) -> Value | None:
+        """The figure of that name and basis; None where it was not computed."""
+        return next((v for v in self.values if (v.figure, v.basis) == (figure, basis)), None)
+
+    def curve(self, name: str) -> Curve | None:
+        return next((c for c in self.curves if c.name == name), None)
