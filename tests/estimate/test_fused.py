@@ -210,8 +210,8 @@ def test_recovery_fused_on_another_simulator(run):
     error = r.torque_Nm[:, 1] - true
     printed = p.torque_Nm[:, 1] - np.interp(p.time_s, profile["t_s"], profile["torque_Nm"])
     assert np.sqrt(np.mean(error**2)) < np.sqrt(np.mean(printed**2)) / 4
-    low, high = r.band(0.95)
-    assert np.mean((low[:, 1] <= true) & (true <= high[:, 1])) > 0.9
+    low, high = r.band(0.95)  # one record: some twenty stretches that err by themselves, so 0.95 +- 0.05
+    assert np.mean((low[:, 1] <= true) & (true <= high[:, 1])) > 0.8
 
 
 def test_recovery_impulse_has_a_sigma_that_holds():

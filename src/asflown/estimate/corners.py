@@ -27,15 +27,15 @@ from .latent import Body, Levels, Posterior, Times, response
 
 #: Sizes of the roughness as shares of the torque's own size near that time (studies/corners.py).
 ROUGHNESS = (0.05, 0.15, 0.45)
-#: What is given beforehand: a quarter to a torque of pure lines, as test torques are and mechanisms seldom; most to
-#: middling roughness; the last to the smooth torque of the fitted levels (studies/corners.py).
-_PRIOR = (0.25, 0.1, 0.275, 0.275, 0.1)
+#: What is given beforehand: nearly half to a torque of pure lines, as much to one with roughness; the last to the
+#: smooth torque of the fitted levels (studies/corners.py).
+_PRIOR = (0.45, 0.1, 0.2, 0.175, 0.075)
 #: Time scale of the roughness, short of what the telemetry resolves; and of what "thereabouts" means. [s]
 ROUGH_LENGTH_S, _NEARBY_S = 4.0, 10.0
 #: Degrees of freedom of the bends: Cauchy, so that one sharp corner does not widen all others.
 BEND_FREEDOM = 1.0
-#: Beta prior of the share of instants that are corners: one in twenty, to a factor of e.
-_CORNER_PRIOR = (1.0, 20.0)
+#: Beta prior of the share of instants that are corners: one in a minute, to a factor of e, however near the candidates.
+_CORNER_PRIOR = (1.0, 60.0)
 #: Most candidate instants; a longer record has them further apart, to at most COARSEST_S. [s]
 _CANDIDATES, COARSEST_S = 1200, 5.0
 #: Proposals for each candidate instant, the fewest in all, and the share thrown away.
@@ -70,6 +70,7 @@ def draw_torques(
     wanted = times.seconds[times.wanted]
     every = round(spacing_s(np.ptp(wanted), float(wanted[1] - wanted[0])) / (wanted[1] - wanted[0]))
     candidates = wanted[::every]
+    spacing = float(candidates[1] - candidates[0])
     t = times.seconds[:, None]
     basis = np.hstack([np.ones_like(t), t - t[0], np.maximum(t - candidates, 0.0)])
     lines = response(body, levels, times, data, basis)
@@ -84,7 +85,7 @@ def draw_torques(
     def chain(grams, share, proposals, count, corners):
         G, b, evidence = grams
         return _sample(
-            G, b, evidence, np.log(share), always, slope**2, np.array(_CORNER_PRIOR), BEND_FREEDOM,
+            G, b, evidence, np.log(share), always, slope**2, np.array([_CORNER_PRIOR[0], _CORNER_PRIOR[1] / spacing]), BEND_FREEDOM,
             proposals, int(_BURN_IN * proposals), count, _MOST_CORNERS, corners, rng,
         )  # fmt: skip
 

@@ -63,7 +63,7 @@ class TorqueResult:
     relative: bool = False
     settings: dict = field(default_factory=dict)  # what the estimator chose: windows, model, inertia
     fits: tuple[dict, ...] = ()  # the polynomial method's orders and misfits
-    paths_Nm: np.ndarray | None = None  # (K, M, 3), torques drawn from the joint posterior
+    paths_Nm: np.ndarray | None = None  # (K, F, 3), torques drawn from the joint posterior, at paths_time_s
     impulses: tuple[
         tuple[float, float, str, float, float | None], ...
     ] = ()  # asked for: start, stop, axis, value, sigma
@@ -82,8 +82,16 @@ class TorqueResult:
             return None
         known = np.isfinite(self.torque_Nm)
         bounds = np.full((2, *self.torque_Nm.shape), np.nan)
-        bounds[:, known] = np.quantile(self.paths_Nm[:, known], [0.5 - share / 2, 0.5 + share / 2], axis=0)
+        every = (self.paths_Nm.shape[1] - 1) // (len(self.time_s) - 1)
+        bounds[:, known] = np.quantile(self.paths_Nm[:, ::every][:, known], [0.5 - share / 2, 0.5 + share / 2], axis=0)
         return bounds[0], bounds[1]
+
+    @property
+    def paths_time_s(self) -> np.ndarray:
+        """Instants of ``paths_Nm``: those of the result, or as many again between."""
+        return np.linspace(
+            self.time_s[0], self.time_s[-1], len(self.time_s) if self.paths_Nm is None else self.paths_Nm.shape[1]
+        )
 
     def impulse(self, start_s: float, stop_s: float, axis: str) -> tuple[float, float | None]:
         """Angular impulse about an axis between two instants (seconds from the epoch), and its sigma. [N m s]
@@ -91,15 +99,16 @@ class TorqueResult:
         The sigma comes from torques drawn from the joint posterior, so that errors which follow each
         other in time are counted as such; None for a method without one."""
         j = AXES.index(axis)
-        inside = (self.time_s >= start_s) & (self.time_s <= stop_s)
-        t = np.concatenate([[start_s], self.time_s[inside], [stop_s]])
 
-        def area(torque):
-            return float(np.trapezoid(np.interp(t, self.time_s, torque), t))
+        def area(time_s, torque):
+            inside = (time_s > start_s) & (time_s < stop_s)
+            t = np.concatenate([[start_s], time_s[inside], [stop_s]])
+            return float(np.trapezoid(np.interp(t, time_s, torque), t))
 
+        value = area(self.time_s, self.torque_Nm[:, j])
         if self.paths_Nm is None:
-            return area(self.torque_Nm[:, j]), None
-        return area(self.torque_Nm[:, j]), float(spread(np.array([area(p[:, j]) for p in self.paths_Nm])))
+            return value, None
+        return value, float(spread(np.array([area(self.paths_time_s, p[:, j]) for p in self.paths_Nm])))
 
     def peak_height(self, time_s: float, reach_s: float, axis: str) -> tuple[float, float | None]:
         """Height of the excursion within ``reach_s`` of a time, and its sigma. [N m]
@@ -112,6 +121,7 @@ class TorqueResult:
         sign = np.sign(mean[np.argmax(np.abs(mean))])
         if self.paths_Nm is None:
             return float(sign * np.max(sign * mean)), None
+        near = np.abs(self.paths_time_s - time_s) <= reach_s
         heights = sign * np.max(sign * self.paths_Nm[:, near, j], axis=1)
         return float(heights.mean()), float(spread(heights))
 

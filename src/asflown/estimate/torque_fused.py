@@ -112,14 +112,17 @@ def fused(
     turning = motion.rate_variance @ (np.mean(H**2, axis=0) * (1 - np.eye(3)))
     seeds = np.random.default_rng(seed).spawn(3)
     torque, sigma, momentum = np.full((3, record.grid.count, 3), np.nan)
-    paths = np.full((PATHS, record.grid.count, 3), np.nan)
+    fine = _finer(record.grid, prior)
+    paths = np.full((PATHS, fine.count, 3), np.nan)
     solved = {}
     for j in axes:
-        s = _solve(bodies[j], fits[j], record.grid, coupling[:, j], prior, known, AXES[j], seeds[j])
+        s = _solve(bodies[j], fits[j], fine, record.grid, coupling[:, j], prior, known, AXES[j], seeds[j])
         solved[AXES[j]] = s
-        own = spread(s.paths)
-        torque[:, j], sigma[:, j] = s.mean, np.sqrt(own**2 + turning[:, j])
-        paths[:, :, j] = s.mean + (s.paths - s.mean) * (sigma[:, j] / own)
+        every = (fine.count - 1) // (record.grid.count - 1)
+        own = spread(s.paths[:, ::every])
+        torque[:, j], sigma[:, j] = s.mean[::every], np.sqrt(own**2 + turning[:, j])
+        wider = np.interp(fine.seconds, record.grid.seconds, sigma[:, j] / own)
+        paths[:, :, j] = s.mean + (s.paths - s.mean) * wider
         momentum[:, j] = H[:, j]
         doubts += s.doubts
     unexplained = [d for a, s in solved.items() for d in innovation_doubts(a, s.innovations)]
@@ -138,6 +141,13 @@ def _too_long_for_corners(grid: Grid) -> str:
     if spacing_s(duration, grid.step_s) <= max(COARSEST_S, grid.step_s):
         return ""
     return f"the record of {duration:.0f} s is too long to look for corners in"
+
+
+def _finer(grid: Grid, prior: str) -> Grid:
+    """The grid of candidate corners: twice as fine where the record is short enough, since a true one lies between two."""
+    if prior != "edges" or spacing_s(float(grid.seconds[-1]), grid.step_s / 2) > grid.step_s / 2 * (1 + 1e-9):
+        return grid
+    return Grid(grid.start_ns, grid.step_s / 2, 2 * grid.count - 1)
 
 
 def _body(subject: Subject, record: Record, inertia_kgm2: float, wiener: bool) -> Body:
@@ -188,10 +198,18 @@ def _carried(subject: Subject, axes, record: Record, motion: Motion, fits):
 
 
 def _solve(
-    body: Body, fit: AxisFit, grid: Grid, coupling: np.ndarray, prior: str, considered: dict[str, float], axis: str, rng
+    body: Body,
+    fit: AxisFit,
+    fine: Grid,
+    grid: Grid,
+    coupling: np.ndarray,
+    prior: str,
+    considered: dict[str, float],
+    axis: str,
+    rng,
 ) -> Solved:
-    """The torque of one axis, ``coupling`` (M,) taken off first."""
-    times, whole = arrange(fit.series, grid.seconds)
+    """The torque of one axis at the ``fine`` instants; ``coupling`` (M,), at those of ``grid``, is taken off first."""
+    times, whole = arrange(fit.series, fine.seconds)
 
     def known(t):
         return -np.interp(t, grid.seconds, coupling)
