@@ -1,0 +1,90 @@
+"""A new actuation against those before it: is one of its figures out of line?
+
+The line through the past is carried to the new date.  How far the new value lies from it, in units of what the past
+scatters, has a known distribution for normal scatter whatever its size: it is drawn by running the same estimator on
+noise with the same dates and weights.  False alarms then come at their stated rate, with ten past events as with fifty.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .slope import HUBER, POWER, YEAR, Values, _mad, _scatter, _sigmas, robust_line
+
+#: Past events needed for a judgement, and draws of the noise.
+FEWEST_PAST, DRAWS = 4, 8000
+_SEED = 20041209
+
+
+@dataclass(frozen=True)
+class Newest:
+    """The newest value, what the past let expect, and how unusual the difference is."""
+
+    day: float
+    value: float
+    expected: float
+    low: float  # 95 % of new values lie between these
+    high: float
+    p_value: float
+    spread: float  # one sigma of new values about the expected one
+    chance: np.ndarray  # (K,), differences that noise alone makes, in spreads of that draw
+    own: np.ndarray  # (K,), one true spread in spreads as estimated in that draw
+
+    def power(self, percent: float, alpha: float = 0.05) -> float:
+        """Probability that a sudden change of that size is called out of line at ``alpha``."""
+        edge = np.quantile(np.abs(self.chance), 1 - alpha)
+        shift = abs(percent / 100 * self.expected) / self.spread if self.spread else np.inf
+        return float(np.mean(np.abs(self.chance + shift * self.own) > edge))
+
+    def detectable(self, alpha: float = 0.05) -> float | None:
+        """Smallest sudden change that is called out of line in 80 of 100 cases. [%]"""
+        if not self.expected or not self.spread:
+            return None
+        low, high = 0.0, 100 * 50 * self.spread / abs(self.expected)
+        for _ in range(40):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if self.power(middle, alpha) >= POWER else (middle, high)
+        return high
+
+
+def newest_of(values: Values) -> Newest | None:
+    """The last of ``values`` against the others; None with fewer than four before it, or all of them at one time."""
+    past = len(values.day) - 1
+    if past < FEWEST_PAST or values.day[past - 1] <= values.day[0]:
+        return None
+    before = values.first(past)
+    s = _sigmas(_scatter(before), values.sigma)  # of all, the newest too
+    x = (values.day - values.day[0]) / YEAR
+    start, slope, scale = _line(x[:past], values.value[:past], s[:past])
+    expected = float(start + slope * x[-1])
+    noise = s * np.random.default_rng(_SEED).standard_normal((DRAWS, past + 1))
+    a, b, drawn = _line(x[:past], noise[:, :past], s[:past])
+    apart = noise[:, -1] - a - b * x[-1]
+    chance, own = apart / drawn, np.std(apart) / drawn
+    usual = np.std(apart) * scale / _usual(drawn)
+    difference = values.value[-1] - expected
+    if scale == 0:
+        p, reach = (1.0 if np.isclose(difference, 0, atol=1e-12 * max(abs(expected), 1)) else 0.0), 0.0
+    else:
+        p = float((1 + np.sum(np.abs(chance) >= abs(difference / scale))) / (1 + DRAWS))
+        reach = float(np.quantile(np.abs(chance), 0.95) * scale)
+    return Newest(
+        float(values.day[-1]), float(values.value[-1]), expected, expected - reach, expected + reach,
+        p, float(usual), chance, own,
+    )  # fmt: skip
+
+
+def _line(x, y, s):
+    """A robust line and the scale of what it leaves, in units of ``s``; a single past outlier moves neither much."""
+    start, slope = robust_line(x, y, s)
+    z = (y - np.asarray(start)[..., None] - np.asarray(slope)[..., None] * x) / s
+    rough = np.maximum(_mad(z), 1e-300)
+    clipped = np.clip(z / rough[..., None], -2 * HUBER, 2 * HUBER) * rough[..., None]
+    return start, slope, np.sqrt(np.sum(clipped**2, axis=-1) / (np.shape(z)[-1] - 2))
+
+
+def _usual(drawn) -> float:
+    """What the scale comes to, in the mean of squares, where the true one is 1."""
+    return float(np.sqrt(np.mean(drawn**2)))
