@@ -64,11 +64,15 @@ def analyse(event: Event, craft: Craft, telemetry: Telemetry | None = None) -> E
                 doubts += [f"{figure.name}: {doubt}"] if doubt else []
                 doubts += _check_doubts(figure, value)
     if event.motor_on_sigma_s:
-        doubts.append(f"the motor's start is known to {event.motor_on_sigma_s:.2g} s (1 sigma): it is not in the event list")
+        doubts.append(
+            f"the motor's start is known to {event.motor_on_sigma_s:.2g} s (1 sigma): it is not in the event list"
+        )
     date = event.date or (utc_label(tlm.epoch_ns + round(event.motor_on_s * NS)) if tlm.dated else None)
     if date is None:
         raise BadInput(
-            f"event {event.id!r} has no date, nor has its telemetry", file=tlm.source, remedy="Give its date in the list."
+            f"event {event.id!r} has no date, nor has its telemetry",
+            file=tlm.source,
+            remedy="Give its date in the list.",
         )
     settings = results["fused"].settings
     return Entry(
@@ -84,7 +88,9 @@ def analyse(event: Event, craft: Craft, telemetry: Telemetry | None = None) -> E
 def _mechanism(craft: Craft, event: Event, tlm: Telemetry) -> Mechanism:
     names = [m.name for m in craft.mechanisms]
     if not names:
-        raise BadInput(f"the craft {craft.name} has no mechanism", remedy="Describe it: [[mechanisms]] in the craft file.")
+        raise BadInput(
+            f"the craft {craft.name} has no mechanism", remedy="Describe it: [[mechanisms]] in the craft file."
+        )
     if len(names) == 1:
         return craft.mechanisms[0]
     moved = [n for n in names if f"cover_angle_{n}" in tlm]
@@ -111,7 +117,7 @@ def _torque(tlm: Telemetry, craft: Craft, mechanism: Mechanism, method: str, var
 
 
 def _about_hinge(result: TorqueResult, mechanism: Mechanism, event: Event) -> Torque:
-    h, axis = _hinge(mechanism)
+    h, _axis = _hinge(mechanism)
     columns = list(result.axes)
     mean = result.torque_Nm[:, columns] @ h[columns]
     known = np.isfinite(mean)

@@ -76,10 +76,7 @@ def load_events(path: str | Path) -> list[Event]:
     out of order, and files that are not there: nothing is analysed of a list with a fault."""
     path = Path(path)
     source = read_bytes(path, "event list", "Give an event list (TOML or CSV). " + _REMEDY)
-    if path.suffix.lower() == ".csv":
-        table = {"event": _csv_rows(source, path)}
-    else:
-        table = toml_table(source, path)
+    table = {"event": _csv_rows(source, path)} if path.suffix.lower() == ".csv" else toml_table(source, path)
     rows = validated(_List, table, path, _REMEDY).event
     seen: set[str] = set()
     for row in rows:
@@ -117,7 +114,9 @@ def _csv_rows(source: bytes, path: Path) -> list[dict]:
                 try:
                     row[name] = float(row[name])
                 except ValueError:
-                    raise BadInput(f"{name} {row[name]!r} is not a number", file=path, line=number, remedy=_REMEDY) from None
+                    raise BadInput(
+                        f"{name} {row[name]!r} is not a number", file=path, line=number, remedy=_REMEDY
+                    ) from None
         rows.append(row)
     return rows
 
@@ -216,4 +215,3 @@ def _one_of(telemetry: Telemetry, stem: str) -> Channel:
             remedy=f"The telemetry holds: {some_of(telemetry.channels)}.",
         )  # fmt: skip
     return found[0].usable
-

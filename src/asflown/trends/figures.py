@@ -158,9 +158,7 @@ def figure_of_merit(unit: str, *, judged: bool = True, is_check: bool = False):
         if names not in (["torque"], ["actuation"]) or not compute.__doc__:
             raise TypeError(f"{compute.__name__}: a figure has one argument, torque or actuation, and a docstring")
         meaning = " ".join(compute.__doc__.split())
-        FIGURES[compute.__name__] = FigureOfMerit(
-            compute.__name__, unit, meaning, names[0], compute, judged, is_check
-        )
+        FIGURES[compute.__name__] = FigureOfMerit(compute.__name__, unit, meaning, names[0], compute, judged, is_check)
         return compute
 
     return declare
@@ -247,9 +245,13 @@ def end_angle(actuation: Actuation):
     if found is None or not len(found[1]):
         return None
     off = abs(found[1][-1] - actuation.target_rad)
-    wanted = "" if off < END_WITHIN else (
-        f"the {actuation.mechanism.name} ends at {np.degrees(found[1][-1]):.2f} deg, "
-        f"not at {np.degrees(actuation.target_rad):.2f} deg"
+    wanted = (
+        ""
+        if off < END_WITHIN
+        else (
+            f"the {actuation.mechanism.name} ends at {np.degrees(found[1][-1]):.2f} deg, "
+            f"not at {np.degrees(actuation.target_rad):.2f} deg"
+        )
     )
     return Measured(float(found[1][-1]), None, wanted)
 

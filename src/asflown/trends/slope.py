@@ -90,7 +90,7 @@ class Trend:
         rising = limit >= self.at(last)
         low, high = self.band(days)
         edge, line = (high, self.at(days)) if rising else (low, self.at(days))
-        passed = (np.greater_equal if rising else np.less_equal)
+        passed = np.greater_equal if rising else np.less_equal
         return tuple(float(days[np.argmax(passed(x, limit))]) if passed(x, limit).any() else None for x in (edge, line))
 
 
@@ -151,7 +151,9 @@ def robust_line(x, y, s, rounds: int = 30) -> tuple[np.ndarray, np.ndarray]:
     pair = np.triu_indices(len(x), 1)
     apart = x[pair[1]] - x[pair[0]]
     keep = np.abs(apart) > 0
-    slope = np.median((y[..., pair[1]] - y[..., pair[0]])[..., keep] / apart[keep], axis=-1)  # Theil and Sen's, to start
+    slope = np.median(
+        (y[..., pair[1]] - y[..., pair[0]])[..., keep] / apart[keep], axis=-1
+    )  # Theil and Sen's, to start
     start = np.median(y - slope[..., None] * x, axis=-1)
     scale = _mad((y - start[..., None] - slope[..., None] * x) / s)[..., None]
     floor = np.maximum(scale, 1e-300)

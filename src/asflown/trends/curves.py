@@ -1,0 +1,117 @@
+"""Whole curves of actuations set against each other: registered in time, then compared.
+
+Two runs of a mechanism show the same excursions a second or two apart, since it runs a little faster or slower.  A
+curve is therefore moved and stretched in time (and, where size is judged elsewhere, scaled) until it fits another best.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from .entry import Curve, Entry
+
+#: The instants curves are compared at, from the motor's start. [s]
+START_S, STOP_S, STEP_S = 0.0, 240.0, 1.0
+#: Largest shift [s] and stretch [share] in registration.
+_SHIFT_S, _STRETCH = 8.0, 0.06
+TORQUE = "torque, fused"
+#: Past curves needed to judge the shape of a new one.
+FEWEST_CURVES = 5
+
+
+@dataclass(frozen=True)
+class Shape:
+    """How far the newest curve's shape lies from the family of past ones, beside how far they lie from each other."""
+
+    distance: float  # rms over time of the difference, in sigmas of the family
+    usual: float  # median of the past curves' own, each against the others
+    p_value: float
+
+
+def sampled(entry: Entry, name: str = TORQUE) -> tuple[np.ndarray, np.ndarray] | None:
+    """(values, sigma) of an entry's curve at the common instants; None where it has none that reaches so far."""
+    curve = entry.curve(name)
+    if curve is None or not len(curve.time_s) or curve.time_s[0] > START_S or curve.time_s[-1] < STOP_S:
+        return None
+    return _at(curve, instants())
+
+
+def instants() -> np.ndarray:
+    return np.arange(START_S, STOP_S + STEP_S / 2, STEP_S)
+
+
+def registered(curve: Curve, onto: np.ndarray, scaled: bool) -> tuple[np.ndarray, np.ndarray]:
+    """``curve`` moved and stretched (and ``scaled``) to fit ``onto``, values at the common instants: (values, sigma).
+
+    The best of a grid of shifts and stretches, then of a finer one about it."""
+    t = instants()
+    best, shift, stretch = np.inf, 0.0, 1.0
+    for width, steps in ((1.0, 9), (0.2, 9)):
+        around = (shift, stretch)
+        for a in around[0] + width * _SHIFT_S * np.linspace(-1, 1, steps):
+            for b in around[1] + width * _STRETCH * np.linspace(-1, 1, steps):
+                v = np.interp(a + b * t, curve.time_s, curve.values)
+                size = _size(v, onto) if scaled else 1.0
+                miss = np.sum((size * v - onto) ** 2)
+                if miss < best:
+                    best, shift, stretch = miss, a, b
+    values, sigma = _at(curve, shift + stretch * t)
+    size = _size(values, onto) if scaled else 1.0
+    return size * values, size * sigma
+
+
+def distance(a: Curve, b: Curve) -> float:
+    """How different two curves are once registered: rms difference as a share of their own rms, symmetric. []"""
+    both = []
+    for one, other in ((a, b), (b, a)):
+        onto, _ = _at(other, instants())
+        moved, _ = registered(one, onto, scaled=False)
+        both.append(np.sqrt(np.mean((moved - onto) ** 2) / (0.5 * np.mean(moved**2 + onto**2))))
+    return float(np.mean(both))
+
+
+def shape_of(newest: Curve, past: list[Curve]) -> Shape | None:
+    """The newest curve's shape against the family's, size put aside; None with fewer than five past curves.
+
+    The family's band is the mean and scatter of the past, registered.  A past curve's own distance is to the band
+    of the others.  The logarithm of the newest's distance is set against theirs (Student's t)."""
+    if len(past) < FEWEST_CURVES:
+        return None
+    onto = np.median([_at(c, instants())[0] for c in past], axis=0)
+    family = [registered(c, onto, scaled=True) for c in past]
+    values = np.array([v for v, _ in family])
+    new, _ = registered(newest, onto, scaled=True)
+    own = np.array([_apart(values[k], np.delete(values, k, axis=0)) for k in range(len(past))])
+    # leave-one-out bands hold one curve fewer: judge the newest against as many
+    apart = float(np.median([_apart(new, np.delete(values, k, axis=0)) for k in range(len(past))]))
+    logs = np.log(own)
+    z = (np.log(apart) - logs.mean()) / (logs.std(ddof=1) * np.sqrt(1 + 1 / len(own)))
+    return Shape(apart, float(np.median(own)), float(stats.t.sf(z, len(own) - 1)))
+
+
+def family_band(curves: list[Curve], share: float = 0.95) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(times, low, high): where a further curve of the family would run with that probability at each instant."""
+    values = np.array([_at(c, instants())[0] for c in curves])
+    n = len(values)
+    reach = stats.t.ppf(0.5 + share / 2, n - 1) * values.std(axis=0, ddof=1) * np.sqrt(1 + 1 / n)
+    return instants(), values.mean(axis=0) - reach, values.mean(axis=0) + reach
+
+
+def _apart(curve, family) -> float:
+    """rms over time of a curve's difference from a family's mean, in its scatter (no smaller than a tenth of the usual)."""
+    scatter = family.std(axis=0, ddof=1)
+    floor = 0.1 * np.sqrt(np.mean(scatter**2))
+    return float(np.sqrt(np.mean(((curve - family.mean(axis=0)) / np.maximum(scatter, floor)) ** 2)))
+
+
+def _size(values, onto) -> float:
+    """Factor that fits ``values`` to ``onto`` best, positive and not absurd."""
+    return float(np.clip((values @ onto) / max(values @ values, 1e-300), 0.2, 5.0))
+
+
+def _at(curve: Curve, t) -> tuple[np.ndarray, np.ndarray]:
+    sigma = np.zeros_like(curve.values) if curve.sigma is None else curve.sigma
+    return np.interp(t, curve.time_s, curve.values), np.interp(t, curve.time_s, sigma)
