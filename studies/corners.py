@@ -21,7 +21,15 @@ Answer, 2026-11 (10 flights each, RMS in mN m, then the two bands):
 RMS hardly depends on any of them.  What has to be there is roughness: lines alone do not hold the cover's band.  With
 ten flights a band's share is uncertain by 0.01 (95 %) and 0.03 (68 %): no choice is better everywhere, and those shipped
 hold on all four.  One chain of proposals was flown then; four are put together since, because on another simulator's cover one
-alone held 0.81 to 0.95 by chance, four 0.93.
+alone held 0.81 to 0.95 by chance, four 0.85 to 0.93.
+
+Candidates were a second apart then, the prior (0.25, 0.1, 0.275, 0.275, 0.1), one corner in twenty candidates.  Half a second, half to
+pure lines and one corner a minute, 40 flights of 30- and 15-s triangles each, 68 % band (benchmarks/torque_accuracy.py):
+
+                                       half noise       nominal  double noise
+    a second, as then                 0.640 0.716   0.702 0.721   0.772 0.766
+    half a second, prior as then      0.675 0.695   0.728 0.753   0.780
+    both, as shipped since            0.631 0.668   0.727 0.720   0.749 0.737
 """
 
 import sys
