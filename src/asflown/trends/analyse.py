@@ -154,7 +154,7 @@ def _check_doubts(figure, value: Value) -> list[str]:
 def _curves(tlm: Telemetry, event: Event, torques: dict[str, Torque], mechanism: Mechanism):
     for basis, torque in torques.items():
         sigma = None
-        if torque.drawn_Nm is not None:
+        if len(torque.drawn_Nm):
             sigma = np.interp(torque.time_s, torque.drawn_time_s, spread(torque.drawn_Nm))
         yield Curve(f"torque, {basis}", "N m", torque.time_s, torque.mean_Nm, sigma)
     actuation = Actuation(tlm, event, mechanism)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -60,8 +61,8 @@ class Event:
     kind: str
     date: str | None = None  # UTC
     file: Path | None = None
-    motor_on_s: float | None = None
-    motor_off_s: float | None = None
+    motor_on_s: float = math.nan
+    motor_off_s: float = math.nan
     start_s: float | None = None
     stop_s: float | None = None
     motor: str | None = None
@@ -141,13 +142,12 @@ def _checked(row: _Row, path: Path) -> Event:
             raise wrong(f"there is no file {row.file} beside the list")
         if row.motor_on_s is None or row.motor_off_s is None:
             raise wrong("with a file it needs motor_on_s and motor_off_s")
-        if not row.motor_on_s < row.motor_off_s:
+        if row.motor_on_s >= row.motor_off_s:
             raise wrong("the motor is switched off before it is on")
     if row.start_s is not None and row.stop_s is not None and not row.start_s < row.stop_s:
         raise wrong("its span ends before it starts")
-    return Event(
-        row.id, row.kind, date, file, row.motor_on_s, row.motor_off_s, row.start_s, row.stop_s, row.motor, row.note
-    )
+    on, off = (math.nan if t is None else t for t in (row.motor_on_s, row.motor_off_s))
+    return Event(row.id, row.kind, date, file, on, off, row.start_s, row.stop_s, row.motor, row.note)
 
 
 def find_events(telemetry: Telemetry, prefix: str = "") -> list[Event]:
@@ -188,7 +188,8 @@ def stall(telemetry: Telemetry, event: Event) -> tuple[float, float] | None:
     """When the motor stalled, seconds after it came on, and sigma; None where the current shows no jump.
 
     A running motor that is stopped by its end stop draws more: the time lies between the two samples of the jump,
-    and is known no better than that (000 section III: 64 s apart)."""
+    and is known no better than that (000 section III: 64 s apart).  Sigma is half the interval: events sampled at the
+    same phase err together, so that neighbours may differ by a whole one for nothing."""
     try:
         current = _one_of(telemetry, "motor_current")
     except BadInput:
@@ -202,7 +203,7 @@ def stall(telemetry: Telemetry, event: Event) -> tuple[float, float] | None:
     before, after = float(np.median(c[: jump + 1])), float(np.median(c[jump + 1 :]))
     if after < (1 + _STALL_RISE) * before:
         return None
-    return 0.5 * float(t[jump] + t[jump + 1]) - event.motor_on_s, float(t[jump + 1] - t[jump]) / np.sqrt(12)
+    return 0.5 * float(t[jump] + t[jump + 1]) - event.motor_on_s, 0.5 * float(t[jump + 1] - t[jump])
 
 
 def _one_of(telemetry: Telemetry, stem: str) -> Channel:

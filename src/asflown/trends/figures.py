@@ -14,7 +14,7 @@ from __future__ import annotations
 import inspect
 import runpy
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -42,14 +42,14 @@ class Torque:
 
     time_s: np.ndarray  # (N,)
     mean_Nm: np.ndarray  # (N,)
-    drawn_time_s: np.ndarray | None = None  # (F,)
-    drawn_Nm: np.ndarray | None = None  # (K, F)
+    drawn_time_s: np.ndarray = field(default_factory=lambda: np.empty(0))  # (F,)
+    drawn_Nm: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))  # (K, F); K = 0: none
     start_sigma_s: float = 0.0  # how well the motor's start is known
 
     def impulse(self, start_s: float, stop_s: float) -> Measured:
         """Angular impulse between two times from the motor's start. [N m s]"""
         value = float(_area(self.time_s, self.mean_Nm, start_s, stop_s))
-        if self.drawn_Nm is None:
+        if not len(self.drawn_Nm):
             return Measured(value)
         own = float(spread(_area(self.drawn_time_s, self.drawn_Nm, start_s, stop_s)))
         ends = np.interp([start_s, stop_s], self.time_s, self.mean_Nm)
@@ -58,7 +58,7 @@ class Torque:
     def momentum(self) -> tuple[np.ndarray, np.ndarray | None]:
         """Momentum given to the body since the motor's start, and drawn ones, at ``time_s`` and ``drawn_time_s``. [N m s]"""
         own = _cumulated(self.time_s, self.mean_Nm)
-        return own, None if self.drawn_Nm is None else _cumulated(self.drawn_time_s, self.drawn_Nm)
+        return own, None if not len(self.drawn_Nm) else _cumulated(self.drawn_time_s, self.drawn_Nm)
 
     def excursions(self, after_s: float, sign: int) -> np.ndarray:
         """Times of the excursions of one sign after a time, the largest first. [s]"""
@@ -75,7 +75,7 @@ class Torque:
     def height(self, times_s, sign: int) -> Measured:
         """Mean height of the excursions at these times, each draw's own extreme near each. [N m]"""
         value = np.mean([_extreme(self.time_s, self.mean_Nm[None], t, sign) for t in times_s], axis=0)
-        if self.drawn_Nm is None:
+        if not len(self.drawn_Nm):
             return Measured(float(value[0]))
         drawn = np.mean([_extreme(self.drawn_time_s, self.drawn_Nm, t, sign) for t in times_s], axis=0)
         return Measured(float(drawn.mean()), float(spread(drawn)))
@@ -293,7 +293,7 @@ def _time_of_largest(torque: Torque, sign: int) -> Measured | None:
     times = torque.excursions(FIRST_PHASE_S, sign)
     if not len(times):
         return None
-    if torque.drawn_Nm is None:
+    if not len(torque.drawn_Nm):
         return Measured(float(times[0]))
     near = np.abs(torque.drawn_time_s - times[0]) <= _APART_S
     drawn = torque.drawn_time_s[near][np.argmax(sign * torque.drawn_Nm[:, near], axis=1)]

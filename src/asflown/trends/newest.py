@@ -57,10 +57,11 @@ def newest_of(values: Values) -> Newest | None:
     before = values.first(past)
     s = _sigmas(_scatter(before), values.sigma)  # of all, the newest too
     x = (values.day - values.day[0]) / YEAR
-    start, slope, scale = _line(x[:past], values.value[:past], s[:past])
+    floor = float(np.median(values.sigma / s))  # what the events' own sigmas alone make: the past cannot scatter less
+    start, slope, scale = _line(x[:past], values.value[:past], s[:past], floor)
     expected = float(start + slope * x[-1])
     noise = s * np.random.default_rng(_SEED).standard_normal((DRAWS, past + 1))
-    a, b, drawn = _line(x[:past], noise[:, :past], s[:past])
+    a, b, drawn = _line(x[:past], noise[:, :past], s[:past], floor)
     apart = noise[:, -1] - a - b * x[-1]
     chance, own = apart / drawn, np.std(apart) / drawn
     usual = np.std(apart) * scale / _usual(drawn)
@@ -76,13 +77,13 @@ def newest_of(values: Values) -> Newest | None:
     )  # fmt: skip
 
 
-def _line(x, y, s):
+def _line(x, y, s, floor):
     """A robust line and the scale of what it leaves, in units of ``s``; a single past outlier moves neither much."""
     start, slope = robust_line(x, y, s)
     z = (y - np.asarray(start)[..., None] - np.asarray(slope)[..., None] * x) / s
     rough = np.maximum(_mad(z), 1e-300)
     clipped = np.clip(z / rough[..., None], -2 * HUBER, 2 * HUBER) * rough[..., None]
-    return start, slope, np.sqrt(np.sum(clipped**2, axis=-1) / (np.shape(z)[-1] - 2))
+    return start, slope, np.maximum(np.sqrt(np.sum(clipped**2, axis=-1) / (np.shape(z)[-1] - 2)), floor)
 
 
 def _usual(drawn) -> float:

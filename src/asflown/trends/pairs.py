@@ -131,11 +131,15 @@ def equivalence(figure: str, pairs: list[Pair], trend: Trend, margin: float = MA
 def curve_distances(entries: list[Entry], pairs: list[Pair], kind: str = "deploy") -> Distances | None:
     """Registered distances of the pairs' torques, and of neighbours in date that are no pair; None without pairs."""
     named = {(p.cold.event, p.warm.event) for p in pairs}
-    with_curve = [e for e in sorted(entries, key=lambda e: e.day) if e.kind == kind and e.curve(TORQUE) is not None]
-    ours, others = [], []
-    for a, b in pairwise(with_curve):
-        d = distance(a.curve(TORQUE), b.curve(TORQUE))
-        (ours if (a.event, b.event) in named else others).append(d)
+    with_curve = [
+        (e.event, c)
+        for e in sorted(entries, key=lambda e: e.day)
+        if e.kind == kind and (c := e.curve(TORQUE)) is not None
+    ]
+    ours: list[float] = []
+    others: list[float] = []
+    for (a, one), (b, other) in pairwise(with_curve):
+        (ours if (a, b) in named else others).append(distance(one, other))
     if not ours:
         return None
     p = float(stats.mannwhitneyu(ours, others, alternative="greater").pvalue) if len(others) >= 3 else None

@@ -87,11 +87,15 @@ class Trend:
         """Days (from 2000-01-01) at which the 95 % band's edge, and the line, first reach ``limit``; None within ``years`` not."""
         last = self.values.day[-1]
         days = last + np.linspace(0, years * YEAR, 2001)
-        rising = limit >= self.at(last)
+        rising = bool(limit >= self.at(last))
         low, high = self.band(days)
         edge, line = (high, self.at(days)) if rising else (low, self.at(days))
-        passed = np.greater_equal if rising else np.less_equal
-        return tuple(float(days[np.argmax(passed(x, limit))]) if passed(x, limit).any() else None for x in (edge, line))
+        return tuple(self._first(days, x, limit, rising) for x in (edge, line))  # type: ignore[return-value]
+
+    @staticmethod
+    def _first(days, x, limit: float, rising: bool) -> float | None:
+        passed = x >= limit if rising else x <= limit
+        return float(days[np.argmax(passed)]) if passed.any() else None
 
 
 def trend_of(values: Values) -> Trend:
@@ -103,7 +107,7 @@ def trend_of(values: Values) -> Trend:
     one = np.ones_like(u)
     scatter = _scatter(values)
     s = _sigmas(scatter, values.sigma)
-    start, rise = robust_line(u, y, s)
+    start, rise = (float(x) for x in robust_line(u, y, s))
     left = y - start - rise * u
     scale = _mad(left / s)
     residual = float(np.median(s)) * float(np.sqrt(np.sum(_psi(left / s, max(scale, 1e-300)) ** 2) / (len(y) - 2)))
@@ -111,8 +115,8 @@ def trend_of(values: Values) -> Trend:
         exact = np.ptp(y) > 0
         change = None if start == 0 else 100 * rise / start
         return Trend(
-            values, start, rise * YEAR / (day[-1] - day[0]), (-np.inf, np.inf), change, None, 1.0 if not exact else 2 / factorial(min(len(y), 12)),
-            scatter, residual, None,
+            values, float(start), float(rise * YEAR / (day[-1] - day[0])), (np.nan, np.nan), change, None,
+            2 / factorial(len(y)) if exact else 1.0, scatter, residual, None,
         )  # fmt: skip
     orders = shuffles(len(y))
 
@@ -123,13 +127,14 @@ def trend_of(values: Values) -> Trend:
         return _p(y, s, one + c * u, u, scale, orders)
 
     d = u - np.average(u, weights=1 / s**2)
-    error = residual / np.median(s) / np.sqrt(np.sum((d / s) ** 2))
+    error = float(residual / np.median(s) / np.sqrt(np.sum((d / s) ** 2)))
     years = (day[-1] - day[0]) / YEAR
     low, high = (_edge(p_of_rise, rise, sign * error) for sign in (-1, 1))
     change, interval = None, None
     if start != 0 and np.all(np.sign(y) == np.sign(start)):
         change = rise / start
-        interval = tuple(100 * _edge(p_of_change, change, sign * abs(error / start)) for sign in (-1, 1))
+        below, above = (100 * _edge(p_of_change, change, sign * abs(error / start)) for sign in (-1, 1))
+        interval = (below, above)
     return Trend(
         values,
         start,
@@ -140,7 +145,7 @@ def trend_of(values: Values) -> Trend:
         p_of_rise(0.0),
         scatter,
         residual,
-        None if change is None else detectable(residual, u) / abs(start) * 100,
+        None if change is None else float(100 * detectable(residual, u) / abs(start)),
     )
 
 

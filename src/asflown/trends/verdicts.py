@@ -1,0 +1,301 @@
+"""Is this mechanism degrading?  Every figure's trend and newest value, cold against warm, cycles: one verdict.
+
+pass: nothing to see.  watch: a figure has a trend, may reach its limit within five years, or its newest value is
+unusual.  alarm: the newest actuation is out of line with the past ones, or a limit is passed.  Looking at many figures
+finds something in one of them by chance; p-values are adjusted for that (Holm), so that a mechanism that does not
+change raises a false alarm in at most 5 of 100 looks, and a false trend in at most 5 of 100.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+
+from ..kit.errors import BadInput, some_of
+from .change import FEW, Step, step_of
+from .curves import TORQUE, Shape, shape_of
+from .entry import Entry
+from .figures import END_WITHIN, FIGURES
+from .newest import FEWEST_PAST, Newest, newest_of
+from .pairs import (
+    COLD_DAYS,
+    MARGIN,
+    WARM_DAYS,
+    Distances,
+    Equivalence,
+    Pair,
+    curve_distances,
+    cycles,
+    equivalence,
+    find_pairs,
+    rests,
+)  # fmt: skip
+from .slope import FEWEST, YEAR, Trend, Values, holm, trend_of
+
+#: Adjusted p-values below which a figure is out of line, and unusual.
+ALARM, WATCH = 0.05, 0.10
+#: A limit that the 95 % band may reach within so long is watched. [years]
+HORIZON_YEARS = 5.0
+#: Share of the allowed cycles from which they are watched.
+_CYCLES_WATCHED = 0.8
+ORDER = ("pass", "watch", "alarm")
+SHAPE = "shape of the torque"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One event's value of a figure."""
+
+    event: str
+    date: str
+    value: float
+    sigma: float | None
+
+
+@dataclass(frozen=True)
+class FigureHealth:
+    """One figure over the years.  ``reasons`` say why it is not simply passed."""
+
+    figure: str
+    basis: str
+    unit: str
+    rows: tuple[Row, ...]
+    trend: Trend | None = None
+    step: Step | None = None
+    newest: Newest | None = None
+    trend_p_adjusted: float | None = None
+    newest_p_adjusted: float | None = None
+    limit: float | None = None
+    limit_reached: tuple[float | None, float | None] = (None, None)  # days from 2000: band's edge, line
+    verdict: str = "pass"
+    reasons: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Health:
+    """What the board is shown of one kind of actuation."""
+
+    craft: str
+    kind: str
+    entries: tuple[Entry, ...]  # of this kind, with figures, in order of date
+    figures: tuple[FigureHealth, ...]
+    shape: Shape | None
+    shape_p_adjusted: float | None
+    pairs: tuple[Pair, ...]
+    equivalences: tuple[Equivalence, ...]
+    distances: Distances | None
+    rest_days: dict[str, float]
+    cycles_used: float
+    cycles_allowed: int | None
+    verdict: str
+    reasons: tuple[str, ...]
+    doubts: tuple[str, ...] = field(default=())
+
+    def figure(self, name: str, basis: str | None = None) -> FigureHealth:
+        """Raises BadInput where there is none of that name."""
+        found = [f for f in self.figures if f.figure == name and basis in (None, f.basis)]
+        if not found:
+            raise BadInput(
+                f"the store holds no figure {name!r} of a {self.kind}" + (f" on the basis {basis!r}" if basis else ""),
+                remedy=f"It holds: {some_of(dict.fromkeys(f.figure for f in self.figures))}.",
+            )
+        return found[0]
+
+
+def judge(
+    entries: list[Entry],
+    *,
+    kind: str = "deploy",
+    cycles_allowed: int | None = None,
+    limits: dict[str, float] | None = None,
+    margin: float = MARGIN,
+    until: str | None = None,
+) -> Health:
+    """Judge all actuations of one kind of one craft; ``entries`` of other kinds count for rests and cycles.
+
+    ``limits``: largest (or, where negative or below the values, smallest) allowed values in SI by figure.
+    ``until``: take this event as the newest, later ones away.  Raises BadInput where there is nothing to judge."""
+    entries = sorted(entries, key=lambda e: (e.day, e.event))
+    if until is not None:
+        last = next((e.day for e in entries if e.event == until), None)
+        if last is None:
+            raise BadInput(
+                f"the store holds no event {until!r}", remedy=f"It holds: {some_of(e.event for e in entries)}."
+            )
+        entries = [e for e in entries if e.day <= last]
+    of_kind = [e for e in entries if e.kind == kind and e.values]
+    if not of_kind:
+        kinds = some_of(sorted({e.kind for e in entries if e.values}))
+        raise BadInput(f"the store holds no {kind} with figures of merit", remedy=f"Kinds it holds: {kinds}.")
+    limits = limits or {}
+    figures = [_figure(of_kind, name, basis) for name, basis in _figures_of(of_kind)]
+    family = [k for k, f in enumerate(figures) if _judged(f)]
+    shape = _shape(of_kind)
+    trended = {k: t.p_value for k in family if (t := figures[k].trend) is not None and len(figures[k].rows) >= FEWEST}
+    adjusted = dict(zip(trended, holm(list(trended.values())), strict=True))
+    # the newest must be the newest event's own: a figure that it lacks says nothing of it
+    fresh: dict[int | str, float] = {
+        k: n.p_value
+        for k in family
+        if (n := figures[k].newest) is not None and figures[k].rows[-1].event == of_kind[-1].event
+    }
+    if shape is not None:
+        fresh[SHAPE] = shape.p_value
+    fresh = dict(zip(fresh, holm(list(fresh.values())).tolist(), strict=True))
+    figures = [
+        _judge_figure(f, adjusted.get(k), fresh.get(k), limits.get(f.figure)) if k in family else f
+        for k, f in enumerate(figures)
+    ]
+    shape_p = fresh.get(SHAPE)
+    pairs = find_pairs(entries, kind)
+    same = [
+        e for k in family
+        if (t := figures[k].trend) is not None and (e := equivalence(figures[k].figure, pairs, t, margin)) is not None
+    ]  # fmt: skip
+    used = cycles(entries)
+    verdicts = [(f.verdict, r) for f in figures for r in f.reasons]
+    verdicts += _shape_verdict(shape_p) + _end_verdict(of_kind) + _cycle_verdict(used, cycles_allowed)
+    worst = max((ORDER.index(v) for v, _ in verdicts), default=0)
+    return Health(
+        of_kind[-1].craft, kind, tuple(of_kind), tuple(figures), shape, shape_p, tuple(pairs), tuple(same),
+        curve_distances(of_kind, pairs, kind), rests(entries), used, cycles_allowed, ORDER[worst],
+        tuple(r for v, r in sorted(verdicts, key=lambda x: -ORDER.index(x[0]))), tuple(_doubts(of_kind, figures, pairs)),
+    )  # fmt: skip
+
+
+def values_of(entries: list[Entry], figure: str, basis: str) -> tuple[list[Entry], Values]:
+    """Entries that hold a figure, and its values.  Nine digits are kept: what differs further down is rounding."""
+    held = [(e, v) for e in entries if (v := e.value(figure, basis)) is not None and v.value is not None]
+    value = np.array([float(f"{v.value:.9g}") for _, v in held])
+    sigma = np.array([v.sigma or 0.0 for _, v in held])
+    return [e for e, _ in held], Values(
+        np.array([e.day for e, _ in held]), value, np.where(sigma > 1e-9 * np.abs(value), sigma, 0.0)
+    )
+
+
+def date_of(day: float | None) -> str | None:
+    """Days from 2000-01-01 as a date."""
+    return None if day is None else (datetime(2000, 1, 1, tzinfo=UTC) + timedelta(days=day)).strftime("%Y-%m-%d")
+
+
+def _figures_of(entries: list[Entry]) -> list[tuple[str, str]]:
+    return list(dict.fromkeys((v.figure, v.basis) for e in entries for v in e.values))
+
+
+def _judged(f: FigureHealth) -> bool:
+    declared = FIGURES.get(f.figure)
+    return f.basis in ("fused", "telemetry") and (declared is None or declared.judged)
+
+
+def _figure(entries: list[Entry], name: str, basis: str) -> FigureHealth:
+    held, values = values_of(entries, name, basis)
+    unit = next(v.unit for e in entries if (v := e.value(name, basis)) is not None)
+    rows = tuple(
+        Row(e.event, e.date, float(v), float(s) or None)
+        for e, v, s in zip(held, values.value, values.sigma, strict=True)
+    )
+    if len(rows) < 3 or values.day[-1] <= values.day[0]:
+        return FigureHealth(name, basis, unit, rows)
+    trend = trend_of(values)
+    return FigureHealth(name, basis, unit, rows, trend, step_of(values, trend.sigmas), newest_of(values))
+
+
+def _shape(entries: list[Entry]) -> Shape | None:
+    curves = [c for e in entries if (c := e.curve(TORQUE)) is not None]
+    return shape_of(curves[-1], curves[:-1]) if curves and entries[-1].curve(TORQUE) is not None else None
+
+
+def _judge_figure(f: FigureHealth, trend_p, newest_p, limit) -> FigureHealth:
+    said: list[tuple[str, str]] = []
+    reached: tuple[float | None, float | None] = (None, None)
+    name = f.figure
+    n = f.newest
+    if n is not None and newest_p is not None and newest_p < WATCH:
+        off = f" ({100 * (n.value / n.expected - 1):+.0f} %)" if n.expected else ""
+        how = "out of line with" if newest_p < ALARM else "unusual beside"
+        said.append((
+            "alarm" if newest_p < ALARM else "watch",
+            f"{name} of {f.rows[-1].event} is {how} the past: {n.value:.3g} {f.unit} where {n.expected:.3g} was to be "
+            f"expected{off}, p = {newest_p:.2g} for all figures together",
+        ))  # fmt: skip
+    t = f.trend
+    if t is not None and trend_p is not None and trend_p < ALARM:
+        span = (t.values.day[-1] - t.values.day[0]) / YEAR
+        if t.change_percent is not None and t.change_percent_ci95 is not None:
+            low, high = t.change_percent_ci95
+            word = "grown" if t.change_percent > 0 else "fallen"
+            said.append(("watch", f"{name} has {word} by {abs(t.change_percent):.0f} % in {span:.1f} years "
+                                  f"(95 %: {low:+.0f} to {high:+.0f} %), p = {trend_p:.2g} for all figures together"))  # fmt: skip
+        else:
+            said.append(
+                (
+                    "watch",
+                    f"{name} changes by {t.slope_per_year:+.2g} {f.unit} a year, p = {trend_p:.2g} for all figures together",
+                )
+            )
+    if limit is not None and f.trend is not None:
+        now = f.rows[-1].value
+        rising = limit >= np.median([r.value for r in f.rows])
+        if (now >= limit) if rising else (now <= limit):
+            said.append(("alarm", f"{name} is past its limit: {now:.3g} against {limit:.3g} {f.unit}"))
+        elif len(f.rows) >= FEWEST:
+            reached = f.trend.crossing(limit)
+            if reached[0] is not None and reached[0] - f.trend.values.day[-1] <= HORIZON_YEARS * YEAR:
+                said.append(
+                    ("watch", f"{name} may reach its limit of {limit:.3g} {f.unit} from {date_of(reached[0])} on")
+                )
+    worst = ORDER[max((ORDER.index(v) for v, _ in said), default=0)]
+    return replace(
+        f, trend_p_adjusted=None if trend_p is None else float(trend_p),
+        newest_p_adjusted=None if newest_p is None else float(newest_p), limit=limit, limit_reached=reached,
+        verdict=worst, reasons=tuple(r for _, r in said),
+    )  # fmt: skip
+
+
+def _shape_verdict(p: float | None) -> list[tuple[str, str]]:
+    if p is None or p >= WATCH:
+        return []
+    how = "out of line with" if p < ALARM else "unusual beside"
+    return [("alarm" if p < ALARM else "watch", f"the {SHAPE} is {how} the past ones', p = {p:.2g}")]
+
+
+def _end_verdict(entries: list[Entry]) -> list[tuple[str, str]]:
+    """Whether the newest arrived: its switch, and its angle beside the usual one."""
+    newest = entries[-1]
+    switch = newest.value("microswitch", "telemetry")
+    found = []
+    if switch is not None and switch.value == 0:
+        found.append(("alarm", f"the microswitch of {newest.event} does not show the end position"))
+    angles = [v.value for e in entries if (v := e.value("end_angle", "telemetry")) is not None and v.value is not None]
+    if len(angles) > 1 and newest.value("end_angle", "telemetry") is not None:
+        off = angles[-1] - float(np.median(angles[:-1]))
+        if abs(off) > END_WITHIN:
+            found.append(("alarm", f"{newest.event} ends {np.degrees(off):+.2f} deg from where the others did"))
+    return found
+
+
+def _cycle_verdict(used: float, allowed: int | None) -> list[tuple[str, str]]:
+    if not allowed or used < _CYCLES_WATCHED * allowed:
+        return []
+    level = "alarm" if used >= allowed else "watch"
+    return [(level, f"{used:g} of {allowed} allowed cycles are used")]
+
+
+def _doubts(entries: list[Entry], figures: list[FigureHealth], pairs: list[Pair]) -> list[str]:
+    said = []
+    n = len(entries)
+    if n < FEWEST:
+        said.append(f"{n} events are too few for a trend's interval: it takes {FEWEST}")
+    elif n <= FEW:
+        said.append(f"with {n} events a sudden change and a slow one are told apart badly")
+    if n <= FEWEST_PAST:
+        said.append(f"the newest event is not judged: that takes {FEWEST_PAST} before it")
+    if not pairs:
+        said.append(
+            f"no cold and warm pair: none comes after {COLD_DAYS:g} days of rest with another within {WARM_DAYS:g} days of its own last actuation"
+        )
+    for e in entries:
+        said += [f"{e.event}: {d}" for d in e.doubts if "should be zero" in d or "does not explain" in d]
+    return said
