@@ -21,7 +21,8 @@ MAY_IMPORT = {
     "plots": {"kit", "craft", "telemetry", "dynamics", "estimate", "trends"},
     "trends": {"kit", "craft", "telemetry", "dynamics", "estimate"},
     "campaigns": {"kit", "craft", "telemetry", "dynamics", "sim", "estimate", "trends"},
-    "cli": {"kit", "craft", "telemetry", "dynamics", "sim", "estimate", "trends", "plots", "campaigns"},
+    "report": {"kit", "estimate", "trends", "plots"},
+    "cli": {"kit", "craft", "telemetry", "dynamics", "sim", "estimate", "trends", "plots", "campaigns", "report"},
 }
 
 

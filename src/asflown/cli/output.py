@@ -3,31 +3,11 @@
 from __future__ import annotations
 
 import json
-import math
 import shutil
 import sys
 import textwrap
-from datetime import date
-from pathlib import Path
 
-
-def plain(value):
-    """Anything a result holds, as JSON has it: numbers finite or null, arrays as lists."""
-    if value is None or isinstance(value, (str, bool)):
-        return value
-    if isinstance(value, int):
-        return value
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, (Path, date)):
-        return str(value)
-    if hasattr(value, "tolist"):  # numpy, without importing it here
-        return plain(value.tolist())
-    if isinstance(value, (list, tuple, set)):
-        return [plain(v) for v in value]
-    raise TypeError(f"no JSON form for {type(value).__name__}")
+from asflown.kit.plain import plain
 
 
 def print_json(record: dict) -> None:

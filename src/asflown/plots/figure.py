@@ -41,12 +41,22 @@ def picture_kind(path: str | Path) -> str:
 
 def save(figure, path: str | Path) -> None:
     """SVG, PNG or PDF by the suffix; text stays text in SVG, and equal input gives equal bytes."""
-    import matplotlib
-
     kind = picture_kind(path)
     date_key = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}[kind]
-    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "asflown", "font.family": "sans-serif"}):
+    with _look("asflown"):
         write_whole(path, lambda p: figure.savefig(p, format=kind, dpi=150, metadata=date_key))
+
+
+def save_svg(figure, stream, salt: str) -> None:
+    """SVG into a text stream; ``salt`` makes its ids differ from other figures' in the same page."""
+    with _look(salt):
+        figure.savefig(stream, format="svg", metadata={"Date": None})
+
+
+def _look(salt: str):
+    import matplotlib
+
+    return matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": salt, "font.family": "sans-serif"})
 
 
 def breaks(time_s, values, longest_step_s: float):

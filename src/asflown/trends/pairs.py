@@ -110,7 +110,7 @@ def equivalence(figure: str, pairs: list[Pair], trend: Trend, margin: float = MA
     y = trend.values.value
     if not found or trend.start == 0 or not np.all(np.sign(y) == np.sign(y[0])) or len(y) < 5:
         return None
-    left = y / trend.at(trend.values.day) - 1
+    left = np.round(y / trend.at(trend.values.day) - 1, 12)
     freedom = len(y) - 2
     scatter = float(np.sqrt(np.sum(left**2) / freedom))
     mean, n = float(np.mean(found)), len(found)

@@ -111,8 +111,9 @@ def trend_of(values: Values) -> Trend:
     left = y - start - rise * u
     scale = _mad(left / s)
     residual = float(np.median(s)) * float(np.sqrt(np.sum(_psi(left / s, max(scale, 1e-300)) ** 2) / (len(y) - 2)))
-    if scale == 0 or not np.any(left):  # all values on one line: nothing to shuffle
-        exact = np.ptp(y) > 0
+    if scale == 0 or np.max(np.abs(left)) <= 1e-9 * np.max(np.abs(y)):  # all on one line: nothing to shuffle
+        exact = abs(rise) > 1e-9 * np.max(np.abs(y))
+        rise = rise if exact else 0.0
         change = None if start == 0 else 100 * rise / start
         return Trend(
             values, float(start), float(rise * YEAR / (day[-1] - day[0])), (np.nan, np.nan), change, None,
@@ -188,6 +189,8 @@ def detectable(residual: float, share) -> float:
 
 def power_of_slope(change: float, residual: float, share) -> float:
     """Probability that a change of that size over the span is told from none at 5 %."""
+    if residual == 0:
+        return 1.0 if change else 0.05
     freedom = len(share) - 2
     edge = stats.t.ppf(0.975, freedom)
     away = change / _error_of_rise(residual, share)

@@ -199,7 +199,8 @@ def _figure(entries: list[Entry], name: str, basis: str) -> FigureHealth:
     if len(rows) < 3 or values.day[-1] <= values.day[0]:
         return FigureHealth(name, basis, unit, rows)
     trend = trend_of(values)
-    return FigureHealth(name, basis, unit, rows, trend, step_of(values, trend.sigmas), newest_of(values))
+    found = FigureHealth(name, basis, unit, rows, trend, step_of(values, trend.sigmas))
+    return replace(found, newest=newest_of(values)) if _judged(found) else found
 
 
 def _shape(entries: list[Entry]) -> Shape | None:

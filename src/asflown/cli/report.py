@@ -1,0 +1,41 @@
+"""The verb `report`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+from .options import JSON
+from .output import plain, print_json, provenance, say, wrapped
+from .trend import LIMIT, WHOSE, health_of, without_password
+
+
+def report(
+    store: str = typer.Argument(help="A trend store: a path (SQLite) or a URL."),
+    out: Path = typer.Option(..., "--out", help="The page (HTML); its JSON twin is written beside it."),
+    craft: str = WHOSE,
+    limit: list[str] = LIMIT,
+    json: bool = JSON,
+) -> None:
+    """Write one page for the anomaly board: verdict first, then trends, overlays, cold against warm, devices, provenance."""
+    from asflown.kit.errors import BadInput
+    from asflown.kit.files import check_place
+
+    if out.suffix.lower() not in (".html", ".htm"):
+        raise BadInput("a report is an HTML page", file=out, remedy="Name it .html.")
+    check_place(out)
+    check_place(out.with_suffix(".json"))
+    from asflown.report.page import write_report
+
+    healths, others = health_of(store, craft, limit)
+    origin = provenance({}, {"store": without_password(store), "craft": craft, "limit": list(limit)})
+    twin, record = write_report(healths, others, out, plain(origin))
+    if json:
+        print_json(record)
+        return
+    for h in healths:
+        print(f"{h.verdict.upper()}: {h.craft}, {h.kind}, {len(h.entries)} events, newest {h.entries[-1].event}")
+        for r in h.reasons:
+            print(wrapped("  ", r))
+    say(f"wrote {out} and {twin}")

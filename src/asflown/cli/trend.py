@@ -1,0 +1,455 @@
+"""The verbs `trend add`, `list`, `show`, `compare` and `watch`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+from .options import CHANNELS, CRAFT, JSON, craft_from, hashes
+from .output import print_doubts, print_json, provenance, say, wrapped
+
+app = typer.Typer(
+    help="Figures of merit of an actuator over years: keep, show, compare, watch.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+STORE = typer.Option(..., "--store", help="A path (SQLite) or a URL (sqlite:///…, postgresql://…).")
+KIND = typer.Option("deploy", "--kind", help="deploy or stow.")
+WHOSE = typer.Option(None, "--craft", help="Which craft's, where the store holds several.")
+FIGURES = typer.Option(None, "--figures", help="A Python file that declares further figures of merit.")
+LIMIT = typer.Option([], "--limit", help='A figure\'s limit, as in "angular_impulse=-0.5 N m s"; may be repeated.')
+FIGURE = typer.Option(None, "--figure", help="One figure of merit; all unless given.")
+BASIS = typer.Option(None, "--basis", help="fused (default), 'momentum, printed', 'transfer, printed' or telemetry.")
+
+
+@app.command(short_help="Analyse a list of actuations and keep the results.")
+def add(
+    events: Path = typer.Argument(
+        help="Event list (TOML or CSV), or telemetry in which the motor's current shows them."
+    ),
+    store: str = STORE,
+    craft: str = CRAFT,
+    channels: Path = CHANNELS,
+    figures: Path = FIGURES,
+    only: str = typer.Option(None, "--only", help="Ids of some events of the list, divided by commas."),
+    jobs: int = typer.Option(0, "--jobs", min=0, help="Events analysed at once; 0: as many as there are cores."),
+    json: bool = JSON,
+) -> None:
+    """Analyse actuations and keep their figures of merit; an event kept before gets a further revision."""
+    from dataclasses import replace
+
+    from asflown.trends.store import TrendStore
+
+    ship = craft_from(craft, None, None)
+    chosen, inputs = _events(events, ship, channels, only)
+    TrendStore.open(store).close()  # a store that cannot be written should say so before the work
+    entries = _analysed(chosen, ship, craft, channels, figures, jobs)
+    options = {"craft": craft, "channels": channels, "figures": figures, "only": only}
+    origin = provenance(inputs | hashes(craft, channels, figures), options)
+    kept_with = {
+        "versions": origin["versions"],
+        "options": {k: None if v is None else str(v) for k, v in options.items()},
+    }
+    kept_with["list"] = origin["inputs"]
+    entries = [replace(e, provenance=kept_with | e.provenance) for e in entries]
+    with TrendStore.open(store) as trends:
+        added = trends.add(entries)
+    if json:
+        print_json({
+            "command": "trend add", "store": without_password(store), "craft": ship.name,
+            "added": [
+                {"event": e.event, "kind": e.kind, "date": e.date, "revision": e.revision,
+                 "figures": sum(v.value is not None for v in e.values), "doubts": list(e.doubts)} for e in added
+            ],
+            "doubts": list(dict.fromkeys(d for e in added for d in e.doubts)), "provenance": origin,
+        })  # fmt: skip
+        return
+    for e in added:
+        kept = f"{sum(v.value is not None for v in e.values):3d} figures" if e.values else "its date only"
+        print(f"  {e.event:24s} {e.date[:10]}  revision {e.revision}  {kept}")
+    for doubt, names in _doubts_by_event(added).items():
+        print(wrapped("  DOUBT  ", f"{doubt} ({names})"))
+    print(f"{len(added)} events kept in {without_password(store)}")
+
+
+@app.command("list", short_help="Events in the store, with rests and cycles.")
+def list_(store: str = STORE, craft: str = WHOSE, json: bool = JSON) -> None:
+    """Events in the store in order of date, with days since the last actuation and cycles used, both from the dates."""
+    from asflown.trends.pairs import cycles, rests, whole_days
+
+    entries, name = _entries(store, craft, curves=False)
+    moves = [e for e in entries if e.kind in ("deploy", "stow")]
+    rest = rests(moves)
+    rows = [
+        {"event": e.event, "kind": e.kind, "date": e.date, "revision": e.revision, "motor": e.motor,
+         "days_since_last": whole_days(rest[e.event]) if e.event in rest else None,
+         "figures": sum(v.value is not None for v in e.values), "doubts": list(e.doubts)} for e in entries
+    ]  # fmt: skip
+    if json:
+        print_json({
+            "command": "trend list", "craft": name, "events": rows, "cycles_used": cycles(moves),
+            "doubts": [], "provenance": provenance({}, {"store": without_password(store), "craft": craft}),
+        })  # fmt: skip
+        return
+    print(f"{name}: {len(rows)} events, {cycles(moves):g} cycles")
+    print(f"  {'event':24s} {'date':10s} {'kind':7s} {'days since last':>15s} {'revision':>8s} {'figures':>7s}")
+    for r in rows:
+        since = "" if r["days_since_last"] is None else str(r["days_since_last"])
+        print(
+            f"  {r['event']:24s} {r['date'][:10]} {r['kind']:7s} {since:>15s} {r['revision']:8d} {r['figures'] or '':>7}"
+        )
+
+
+@app.command(short_help="A figure over the years, with its trend.")
+def show(
+    store: str = STORE,
+    figure: str = FIGURE,
+    basis: str = BASIS,
+    kind: str = KIND,
+    craft: str = WHOSE,
+    limit: list[str] = LIMIT,
+    plot: Path = typer.Option(None, "--plot", help="Draw the figure (SVG, PNG or PDF by its suffix)."),
+    json: bool = JSON,
+) -> None:
+    """A figure over the years: robust slope and change with intervals, permutation p-value, what would have been seen."""
+    from asflown.trends.record import figure_record
+
+    health = _health(store, craft, kind, limit)
+    found = (
+        [health.figure(figure, basis)]
+        if figure
+        else [f for f in health.figures if f.basis in (basis or "fused", "telemetry")]
+    )
+    if plot is not None:
+        from asflown.plots.figure import save
+        from asflown.plots.trend import trend_figure
+
+        save(trend_figure(found[0]), plot)
+        say(f"wrote {plot}")
+    if json:
+        rest = {} if figure else {"figures": [figure_record(f) for f in found]}
+        print_json({
+            "command": "trend show", "craft": health.craft, "kind": kind, **figure_record(found[0]), **rest,
+            "doubts": list(health.doubts),
+            "provenance": provenance({}, {"store": without_password(store), "figure": figure, "basis": basis, "limit": limit}),
+        })  # fmt: skip
+        return
+    for f in found:
+        _print_figure(f, rows=figure is not None)
+    print_doubts(health.doubts)
+
+
+@app.command(short_help="Cold against warm, or any two events.")
+def compare(
+    first: str = typer.Argument(None, help="An event, to set a second against; cold and warm pairs unless given."),
+    second: str = typer.Argument(None),
+    store: str = STORE,
+    figure: str = FIGURE,
+    kind: str = KIND,
+    craft: str = WHOSE,
+    margin: float = typer.Option(15.0, "--margin", min=0.1, max=100, help="Difference that counts as none [%]."),
+    json: bool = JSON,
+) -> None:
+    """Cold actuations against the warm ones after them: certainly no more different than a margin?"""
+    from asflown.kit.errors import BadInput
+    from asflown.trends.record import cold_warm_record
+
+    if (first is None) != (second is None):
+        raise BadInput("one event alone cannot be compared", remedy="Name two, or none for cold against warm.")
+    health = _health(store, craft, kind, [], margin=margin / 100)
+    record = cold_warm_record(health) if first is None else _two(health, first, second)
+    if figure is not None:
+        health.figure(figure)
+        for key in ("equivalence", "figures"):
+            if key in record:
+                record[key] = [r for r in record[key] if r["figure"] == figure]
+    if json:
+        print_json({
+            "command": "trend compare", "craft": health.craft, "kind": kind, **record, "doubts": list(health.doubts),
+            "provenance": provenance({}, {"store": without_password(store), "margin_percent": margin, "figure": figure}),
+        })  # fmt: skip
+        return
+    _print_two(record) if first else _print_cold_warm(record)
+    print_doubts(health.doubts)
+
+
+@app.command(short_help="The newest actuation against the past: exit 3 on alarm.")
+def watch(
+    store: str = STORE,
+    figure: str = FIGURE,
+    event: str = typer.Option(None, "--event", help="Judge this event, later ones put aside; the newest unless given."),
+    kind: str = KIND,
+    craft: str = WHOSE,
+    limit: list[str] = LIMIT,
+    json: bool = JSON,
+) -> None:
+    """Judge the newest actuation against the family of the past ones: pass, watch or alarm, and why.  Exit 3 on alarm."""
+    from asflown.trends.record import figure_record, health_record
+    from asflown.trends.verdicts import ORDER
+
+    health = _health(store, craft, kind, limit, until=event)
+    verdict, reasons = health.verdict, list(health.reasons)
+    figures = [f for f in health.figures if f.newest is not None and f.basis in ("fused", "telemetry")]
+    if figure is not None:
+        figures = [health.figure(figure)]
+        verdict, reasons = figures[0].verdict, list(figures[0].reasons)
+    if json:
+        whole = health_record(health)
+        print_json({
+            "command": "trend watch", "craft": health.craft, "kind": kind, "event": whole["newest_event"],
+            "verdict": verdict, "reasons": reasons, "figures": [figure_record(f) for f in figures],
+            "shape": whole["shape"], "cycles": whole["cycles"], "doubts": whole["doubts"],
+            "provenance": provenance({}, {"store": without_password(store), "figure": figure, "event": event, "limit": limit}),
+        })  # fmt: skip
+    else:
+        print(f"{verdict.upper()}: {health.craft}, {kind}, {health.entries[-1].event}")
+        for r in reasons:
+            print(wrapped("  ", r))
+        _print_newest(health, figures)
+        print_doubts(health.doubts)
+    if verdict == ORDER[-1]:
+        raise typer.Exit(3)
+
+
+def _events(path: Path, ship, channels, only: str | None):
+    """Events to analyse and the inputs' SHA-256."""
+    from asflown.kit.errors import BadInput, some_of
+    from asflown.telemetry.load import load_telemetry
+    from asflown.trends.events import find_events, is_event_list, load_events
+
+    found = (
+        load_events(path) if is_event_list(path) else find_events(load_telemetry(path, channels=channels, craft=ship))
+    )
+    if only is not None:
+        wanted = [name.strip() for name in only.split(",")]
+        missing = [name for name in wanted if name not in {e.id for e in found}]
+        if missing:
+            raise BadInput(f"--only names {some_of(missing)}, which the list does not hold", file=path,
+                           remedy=f"It holds: {some_of(e.id for e in found)}.")  # fmt: skip
+        found = [e for e in found if e.id in wanted]
+    return found, hashes(path)
+
+
+def _analysed(events, ship, craft: str, channels, figures, jobs: int):
+    """Entries of all events, in order; nothing is kept before all are sound."""
+    import os
+    from concurrent.futures import ProcessPoolExecutor
+    from functools import partial
+
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    work = partial(_one, ship=ship, channels=channels, figures=figures)
+    jobs = min(jobs or os.cpu_count() or 1, max(1, sum(e.file is not None for e in events) // 2))
+    with Progress(
+        TextColumn("{task.description:36s}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=Console(stderr=True)
+    ) as bar:  # fmt: skip
+        task = bar.add_task("analysing", total=len(events))
+        entries = []
+
+        def take(found):
+            for e in found:
+                entries.append(e)
+                bar.update(task, advance=1, description=f"analysed {e.event}")
+
+        if jobs <= 1:
+            take(map(work, events))
+        else:
+            with ProcessPoolExecutor(jobs) as pool:
+                take(pool.map(work, events))
+    return entries
+
+
+def _one(event, ship, channels, figures):
+    from asflown.telemetry.load import load_telemetry
+    from asflown.trends.analyse import analyse
+    from asflown.trends.figures import load_figures
+
+    if figures is not None:
+        load_figures(figures)
+    telemetry = None if event.file is None else load_telemetry(event.file, channels=channels, craft=ship)
+    return analyse(event, ship, telemetry)
+
+
+def _entries(store: str, craft: str | None, curves: bool):
+    """All latest entries of the one craft asked for, and its name."""
+    from asflown.kit.errors import BadInput, some_of
+    from asflown.trends.store import TrendStore
+
+    with TrendStore.open(store, create=False) as trends:
+        crafts = trends.crafts()
+        if craft is not None:
+            craft = Path(craft).stem if craft.endswith(".toml") else craft
+        if not crafts or (craft is not None and craft not in crafts):
+            what = "is empty" if not crafts else f"holds nothing of {craft!r}"
+            raise BadInput(f"the store {what}", file=without_password(store),
+                           remedy=f"Crafts it holds: {some_of(crafts)}. `asflown trend add` fills it.")  # fmt: skip
+        if craft is None and len(crafts) > 1:
+            raise BadInput(f"the store holds several crafts: {some_of(crafts)}", file=without_password(store),
+                           remedy="Choose one with --craft.")  # fmt: skip
+        name = craft or crafts[0]
+        return trends.entries(name, curves=curves), name
+
+
+def health_of(store: str, craft: str | None, limits: list[str]):
+    """Verdicts over every kind of actuation that has figures, deploys first, and the entries of other kinds."""
+    from asflown.kit.errors import BadInput
+    from asflown.trends.verdicts import judge
+
+    entries, name = _entries(store, craft, curves=True)
+    moves = [e for e in entries if e.kind in ("deploy", "stow")]
+    kinds = [k for k in ("deploy", "stow") if any(e.kind == k and e.values for e in moves)]
+    if not kinds:
+        raise BadInput("the store holds no actuation with figures of merit", file=without_password(store),
+                       remedy="`asflown trend add` fills it.")  # fmt: skip
+    allowed, limit = _cycles_allowed(name, moves), _limits(limits, moves)
+    healths = [judge(moves, kind=k, cycles_allowed=allowed, limits=limit) for k in kinds]
+    return healths, [e for e in entries if e.kind not in ("deploy", "stow")]
+
+
+def _health(store: str, craft: str | None, kind: str, limits: list[str], **options):
+    """The verdict over everything the store holds of one kind."""
+    from asflown.trends.verdicts import judge
+
+    entries, name = _entries(store, craft, curves=True)
+    return judge(
+        entries, kind=kind, cycles_allowed=_cycles_allowed(name, entries), limits=_limits(limits, entries), **options
+    )
+
+
+def _cycles_allowed(name: str, entries) -> int | None:
+    """Of the mechanism that the entries are of, where the craft is a built-in one."""
+    from asflown.craft.load import built_in_crafts, load_craft
+
+    moved = {e.provenance.get("mechanism") for e in entries} - {None}
+    if name not in built_in_crafts() or len(moved) != 1:
+        return None
+    return load_craft(name).mechanism(moved.pop()).cycles_allowed
+
+
+def _limits(texts: list[str], entries) -> dict[str, float]:
+    """'angular_impulse=-0.5 N m s' -> SI by figure, the unit checked against the figure's."""
+    from asflown.kit.errors import BadInput, some_of
+    from asflown.kit.quantities import quantity
+
+    units = {v.figure: v.unit for e in entries for v in e.values}
+    found = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals or name.strip() not in units:
+            raise BadInput(f"--limit {text!r} does not name a figure of this store",
+                           remedy=f'Write it as in "angular_impulse=-0.5 N m s". Figures: {some_of(units)}.')  # fmt: skip
+        found[name.strip()] = quantity(value.strip(), units[name.strip()])
+    return found
+
+
+def _two(health, first: str, second: str) -> dict:
+    """Two events' figures side by side, and how far apart their curves are."""
+    import numpy as np
+
+    from asflown.kit.errors import BadInput, some_of
+    from asflown.trends.curves import TORQUE, distance
+
+    by_name = {e.event: e for e in health.entries}
+    for name in (first, second):
+        if name not in by_name:
+            raise BadInput(f"no {health.kind} called {name!r} has figures", remedy=f"There are: {some_of(by_name)}.")
+    a, b = by_name[first], by_name[second]
+    rows = []
+    for v in a.values:
+        w = b.value(v.figure, v.basis)
+        if v.basis in ("fused", "telemetry") and w is not None and None not in (v.value, w.value):
+            sigma = None if None in (v.sigma, w.sigma) else float(np.hypot(v.sigma, w.sigma))
+            rows.append({
+                "figure": v.figure, "unit": v.unit, "first": v.value, "second": w.value,
+                "difference": w.value - v.value, "sigma_difference": sigma,
+            })  # fmt: skip
+    curves = a.curve(TORQUE), b.curve(TORQUE)
+    apart = None if None in curves else distance(*curves)
+    return {"first": first, "second": second, "figures": rows, "curve_distance": apart}
+
+
+def _print_figure(f, rows: bool) -> None:
+    t = f.trend
+    print(f"{f.figure} · {f.basis} · [{f.unit or '1'}] · {f.verdict}")
+    if rows:
+        for r in f.rows:
+            print(f"  {r.event:24s} {r.date[:10]}  {r.value:+.4g}" + ("" if r.sigma is None else f" +- {r.sigma:.2g}"))
+    if t is None:
+        print("  too few events for a trend")
+        return
+    change = "" if t.change_percent is None else f"change {t.change_percent:+.1f} %"
+    if t.change_percent_ci95:
+        change += f" (95 %: {t.change_percent_ci95[0]:+.1f} to {t.change_percent_ci95[1]:+.1f})"
+    print(f"  {change or 'no relative change'}   slope {t.slope_per_year:+.3g} a year   p {t.p_value:.2g}" + (
+        "" if f.trend_p_adjusted is None else f" ({f.trend_p_adjusted:.2g} for all figures)"))  # fmt: skip
+    if t.detectable_percent is not None:
+        print(f"  a change of {t.detectable_percent:.0f} % would have been seen in 8 of 10 such histories")
+    for reason in f.reasons:
+        print(wrapped("  ", reason))
+
+
+def _print_newest(health, figures) -> None:
+    print(
+        f"  {'figure':24s} {'value':>11s} {'expected':>11s} {'95 % from':>11s} {'to':>11s} {'p':>7s} {'all':>7s}  seen from"
+    )
+    for f in figures:
+        n = f.newest
+        if n is None:
+            continue
+        adjusted = "" if f.newest_p_adjusted is None else f"{f.newest_p_adjusted:7.2g}"
+        least = n.detectable()
+        seen = "" if least is None else f"{least:.0f} %"
+        print(
+            f"  {f.figure:24s} {n.value:+11.4g} {n.expected:+11.4g} {n.low:+11.4g} {n.high:+11.4g} {n.p_value:7.2g} {adjusted:>7s}  {seen}"
+        )
+    if health.shape is not None:
+        s = health.shape
+        print(
+            f"  shape of the torque: {s.distance:.2f} from the family, the others usually {s.usual:.2f}; p {s.p_value:.2g}"
+        )
+
+
+def _print_cold_warm(record: dict) -> None:
+    for p in record["pairs"]:
+        print(f"  cold {p['cold']} (after {p['rest_days']} days) · warm {p['warm']}")
+    if record["equivalence"]:
+        print(f"  {'figure':24s} {'warm - cold':>12s} {'90 % interval':>20s} {'p':>8s}   certain within")
+    for e in record["equivalence"]:
+        low, high = e["difference_percent_ci90"]
+        word = f"within {e['margin_percent']:g} %" if e["equivalent"] else f"not shown within {e['margin_percent']:g} %"
+        print(f"  {e['figure']:24s} {e['difference_percent']:+11.1f}% {low:+9.1f} to {high:+6.1f}% {e['p_value']:8.2g}   "
+              f"{e['provable_percent']:.0f} %: {word}")  # fmt: skip
+    c = record["curves"]
+    if c:
+        p = "" if c["p_value"] is None else f"; p = {c['p_value']:.2g} that pairs differ more"
+        print(f"  whole curves: pairs {', '.join(f'{d:.2f}' for d in c['pairs'])}; other neighbours "
+              f"{min(c['others']):.2f} to {max(c['others']):.2f}{p}" if c["others"] else "  whole curves: no other neighbours")  # fmt: skip
+
+
+def _print_two(record: dict) -> None:
+    print(f"  {'figure':24s} {record['first']:>22s} {record['second']:>22s}   difference")
+    for r in record["figures"]:
+        sigma = "" if r["sigma_difference"] is None else f" +- {r['sigma_difference']:.2g}"
+        print(
+            f"  {r['figure']:24s} {r['first']:+22.4g} {r['second']:+22.4g}   {r['difference']:+.3g}{sigma} {r['unit']}"
+        )
+    if record["curve_distance"] is not None:
+        print(f"  curves, registered: rms difference {100 * record['curve_distance']:.0f} % of their size")
+
+
+def _doubts_by_event(entries) -> dict[str, str]:
+    """Every doubt once, with how many events have it."""
+    found: dict[str, list[str]] = {}
+    for e in entries:
+        for d in e.doubts:
+            found.setdefault(d, []).append(e.event)
+    return {d: names[0] if len(names) == 1 else f"{len(names)} events" for d, names in found.items()}
+
+
+def without_password(store: str) -> str:
+    import re
+
+    return re.sub(r"(://[^:/@]*):[^@/]*@", r"\1:***@", store)

@@ -1,0 +1,176 @@
+"""The report: one HTML file that opens offline, light and dark, on paper and on a phone, and its JSON twin.
+
+Reads a verdict, draws with plots, fills a template.  Pictures are SVG inside the page; their ink and greys are the
+page's own colours, so that they follow it into the dark."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+
+from ..kit.files import write_text
+from ..kit.plain import plain
+from ..plots import trend as draw
+from ..plots.figure import GREY, save_svg
+from ..trends.entry import Entry
+from ..trends.record import health_record
+from ..trends.verdicts import FigureHealth, Health
+
+#: Ink in which the pictures are drawn, to be replaced by the page's.
+_INK, _GRID = "#010203", "#e4e4e4"
+
+
+@dataclass(frozen=True)
+class Picture:
+    title: str
+    words: str
+    svg: str
+
+
+def write_report(healths: list[Health], others: list[Entry], out: Path, provenance: dict) -> tuple[Path, dict]:
+    """The page at ``out`` and its JSON twin beside it; returns the twin's path and what it holds.
+
+    ``healths``: a verdict for each kind of actuation, the one that decides first; ``others``: entries of other kinds
+    (wheels).  Raises BadInput where the places cannot be written."""
+    from .. import __version__
+
+    twin = out.with_suffix(".json")
+    record = {
+        "command": "report", "verdict": healths[0].verdict, "reasons": list(healths[0].reasons),
+        "kinds": [health_record(h) for h in healths],
+        "wheels": [_entry_record(e) for e in others],
+        "doubts": list(dict.fromkeys(d for h in healths for d in h.doubts)), "provenance": provenance,
+    }  # fmt: skip
+    page = _template().render(
+        healths=healths, main=healths[0], sections=[(h, _pictures(h)) for h in healths], wheels=others,
+        record=record, provenance=provenance, version=__version__,
+    )  # fmt: skip
+    write_text(out, page)
+    write_text(twin, json.dumps(plain(record), allow_nan=False, indent=1) + "\n")
+    return twin, record
+
+
+def _pictures(h: Health) -> list[Picture]:
+    """Pictures of one kind of actuation, in the order a board asks for them."""
+    entries, newest = list(h.entries), h.entries[-1]
+    one = f"the {h.kind} of {newest.date[:10]}"
+    pictures: list[Picture] = []
+
+    def add(name: str, title: str, words: str, figure) -> None:
+        pictures.append(Picture(title, words, _svg(figure, f"{h.kind}-{name}")))
+
+    for name in ("angular_impulse", "peak_positive", "peak_negative"):
+        found = [f for f in h.figures if f.figure == name and len(f.rows) > 1]
+        if found:
+            add(name, f"{name.replace('_', ' ')} over the years", _trend_words(found[0]), draw.trend_figure(*found))
+    for f in h.figures:
+        if f.verdict != "pass" and f.figure not in ("angular_impulse", "peak_positive", "peak_negative"):
+            add(f.figure, f"{f.figure.replace('_', ' ')} over the years", _trend_words(f), draw.trend_figure(f))
+    if len(entries) > 3:
+        add("family", "The newest in front of its family", f"{one}, fused, and where 95 of 100 further ones would run "
+            "at each instant.", draw.family_figure(newest, entries[:-1], "newest against the past"))  # fmt: skip
+    for basis in ("fused", "momentum, printed", "transfer, printed"):
+        if any(e.curve(f"torque, {basis}") is not None for e in entries):
+            add(f"overlay-{basis[:5]}", f"All {h.kind}s, {basis}", "Older ones in lighter grey, the first dotted blue, the newest red.",
+                draw.overlay_figure(entries, f"torque, {basis}", basis))  # fmt: skip
+    for basis in ("fused", "momentum, printed", "transfer, printed"):
+        if newest.curve(f"torque, {basis}") is not None:
+            add(f"merit-{basis[:5]}", f"Figures of merit, {basis}", f"{one}: shaded the impulse of the first phase, dashed the mean "
+                "of the two largest excursions of each sign after it.", draw.merit_figure(newest, basis, basis))  # fmt: skip
+    if h.pairs:
+        for basis in ("fused", "momentum, printed", "transfer, printed"):
+            add(f"cold-{basis[:5]}", f"Cold and warm, {basis}", "Crosses: after a long rest; rings: the next one. A colour a pair.",
+                draw.cold_warm_figure(h.pairs, f"torque, {basis}", basis))  # fmt: skip
+    if newest.curve("motor_current") is not None:
+        add("devices", "Devices", f"{one}: the motor stalls in the green span, between two samples.",
+            draw.devices_figure(newest, "thermal and devices data beside the torque"))  # fmt: skip
+    add("methods", "Methods compared", f"{one}: all channels at once with its 95 % band, and the papers' two methods.",
+        draw.methods_figure(newest, "three bases"))  # fmt: skip
+    return pictures
+
+
+def _trend_words(f: FigureHealth) -> str:
+    t = f.trend
+    if t is None:
+        return "Too few events for a trend."
+    said = f"{len(f.rows)} events; p = {t.p_value:.2g}"
+    if t.change_percent is not None and t.change_percent_ci95 is not None:
+        low, high = t.change_percent_ci95
+        said = f"Change over the years {t.change_percent:+.0f} % (95 %: {low:+.0f} to {high:+.0f} %), {said}"
+    if t.detectable_percent is not None:
+        said += f"; a change of {t.detectable_percent:.0f} % would have been seen in 8 of 10 such histories"
+    return said + "."
+
+
+def _svg(figure, name: str) -> str:
+    """The figure as SVG to stand inside a page: no declaration, ids of its own, the page's colours."""
+    for ax in figure.axes:
+        ax.set_title("", loc="left")  # the page has its own above
+        _ink(ax)
+    buffer = io.StringIO()
+    save_svg(figure, buffer, salt=name)
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r' (?:width|height)="[\d.]+pt"', "", text, count=2)
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.S)
+    text = re.sub(r'\bid="([^"]+)"', rf'id="{name}-\1"', text)
+    text = re.sub(r'(url\(#|href="#)', rf"\1{name}-", text)
+    for k, grey in enumerate(draw.GREYS):
+        text = text.replace(grey, f"var(--g{k})")
+    for old, new in ((_INK, "currentColor"), ("#000000", "currentColor"), (_GRID, "var(--grid)"), (GREY, "var(--mid)")):
+        text = text.replace(old, new)
+    return text
+
+
+def _ink(ax) -> None:
+    ax.set_facecolor("none")
+    ax.figure.patch.set_visible(False)
+    ax.tick_params(colors=_INK)
+    for spine in ax.spines.values():
+        spine.set_color(_INK)
+    legend = ax.get_legend()
+    for words in (ax.title, ax._left_title, ax.xaxis.label, ax.yaxis.label, *(legend.get_texts() if legend else ())):
+        words.set_color(_INK)
+    ax.xaxis.get_offset_text().set_color(_INK)
+
+
+def _entry_record(e: Entry) -> dict:
+    return {
+        "event": e.event, "kind": e.kind, "date": e.date, "revision": e.revision, "doubts": list(e.doubts),
+        "values": [{"figure": v.figure, "value": v.value, "sigma": v.sigma, "unit": v.unit} for v in e.values],
+    }  # fmt: skip
+
+
+def _template():
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters |= {"quantity": _quantity, "number": _number, "interval": _interval}
+    source = resources.files("asflown.report") / "templates" / "report.html"
+    return environment.from_string(source.read_text(encoding="utf-8"))
+
+
+def _number(value, digits: int = 3) -> str:
+    return "" if value is None or not np.isfinite(value) else f"{value:.{digits}g}"
+
+
+def _interval(ends) -> str:
+    """'+13 to +40 %'; nothing where an end is not known."""
+    return "" if ends is None or not np.isfinite(ends).all() else f"{ends[0]:+.0f} to {ends[1]:+.0f} %"
+
+
+def _quantity(value, sigma, unit: str) -> str:
+    """'-0.282 ± 0.004 N m s', in the unit people read."""
+    if value is None:
+        return "not known"
+    scale, shown = draw.DRAWN_IN.get(unit, (1.0, unit))
+    if not sigma:
+        return f"{scale * value:.4g} {shown}".strip()
+    digits = max(0, 1 - int(np.floor(np.log10(scale * sigma))))
+    return f"{scale * value:.{digits}f} ± {scale * sigma:.{digits}f} {shown}".strip()
