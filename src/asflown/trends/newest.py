@@ -14,7 +14,7 @@ import numpy as np
 from .slope import HUBER, POWER, YEAR, Values, _mad, _scatter, _sigmas, robust_line
 
 #: Past events needed for a judgement, and draws of the noise.
-FEWEST_PAST, DRAWS = 4, 8000
+FEWEST_PAST, DRAWS = 4, 5000
 _SEED = 20041209
 
 

@@ -11,6 +11,7 @@ are the hypotheses the test does not refuse; with ten events a normal approximat
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import permutations
 from math import factorial
 
@@ -150,7 +151,7 @@ def trend_of(values: Values) -> Trend:
     )
 
 
-def robust_line(x, y, s, rounds: int = 30) -> tuple[np.ndarray, np.ndarray]:
+def robust_line(x, y, s, rounds: int = 12) -> tuple[np.ndarray, np.ndarray]:
     """Huber's line through y (..., N) of standard deviations ``s`` up to a factor: (at x = 0, slope per x)."""
     y = np.asarray(y, float)
     x = np.asarray(x, float)
@@ -173,6 +174,7 @@ def robust_line(x, y, s, rounds: int = 30) -> tuple[np.ndarray, np.ndarray]:
     return start, slope
 
 
+@cache
 def shuffles(count: int) -> np.ndarray:
     """Orders of so many events, (P, count): all but the true one, or a seeded sample of them."""
     if factorial(count) <= SHUFFLES + 1:
@@ -240,7 +242,7 @@ def _scatter(values: Values) -> float:
     low, high = 0.0, float(np.ptp(y))
     if high == 0 or (np.all(sigma > 0) and excess(0.0) <= 0):
         return 0.0
-    for _ in range(40):
+    for _ in range(25):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if excess(middle) > 0 else (low, middle)
     return high
@@ -251,7 +253,7 @@ def _p(y, s, nuisance, direction, scale, orders) -> float:
     g, d, z = nuisance / s, direction / s, y / s
     d = d - g * (g @ d) / (g @ g)
     m = (g @ z) / (g @ g)
-    for _ in range(20):
+    for _ in range(8):
         w = np.minimum(1, HUBER * scale / np.maximum(np.abs(z - m * g), 1e-300))
         m = (w * g) @ z / ((w * g) @ g)
     psi = _psi(z - m * g, scale)
@@ -261,14 +263,14 @@ def _p(y, s, nuisance, direction, scale, orders) -> float:
 
 def _edge(p_of, estimate: float, step: float, alpha: float = 0.05) -> float:
     """Where hypotheses from ``estimate`` on, in the direction of ``step``, begin to be refused; infinite where none is."""
-    inside, outside = estimate, estimate + 2 * step
+    inside, outside = estimate, estimate + 3 * step
     for _ in range(20):
         if p_of(outside) <= alpha:
             break
         inside, outside = outside, outside + 2 * (outside - estimate)
     else:
         return float(np.copysign(np.inf, step))
-    for _ in range(25):
+    for _ in range(12):
         middle = 0.5 * (inside + outside)
         inside, outside = (inside, middle) if p_of(middle) <= alpha else (middle, outside)
     return float(outside)
