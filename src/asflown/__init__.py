@@ -23,6 +23,8 @@ _PUBLIC = {
     "load_scenario": "asflown.sim.scenario",
     "fly": "asflown.sim.fly",
     "write_flight": "asflown.sim.fly",
+    "figure_of_merit": "asflown.trends.figures",
+    "TrendStore": "asflown.trends.store",
     "error_budget": "asflown.campaigns.budget",
 }
 
@@ -52,3 +54,5 @@ if TYPE_CHECKING:
     from asflown.telemetry.load import load_telemetry
     from asflown.telemetry.tables import write_table
     from asflown.telemetry.telemetry import Telemetry
+    from asflown.trends.figures import figure_of_merit
+    from asflown.trends.store import TrendStore

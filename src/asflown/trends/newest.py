@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .slope import HUBER, POWER, YEAR, Values, _mad, _scatter, _sigmas, robust_line
+from .slope import HUBER, POWER, YEAR, Values, _mad, _scatter, _sigmas, robust_line, sizes
 
 #: Past events needed for a judgement, and draws of the noise.
 FEWEST_PAST, DRAWS = 4, 5000
@@ -55,8 +55,9 @@ def newest_of(values: Values) -> Newest | None:
     if past < FEWEST_PAST or values.day[past - 1] <= values.day[0]:
         return None
     before = values.first(past)
-    s = _sigmas(_scatter(before), values.sigma)  # of all, the newest too
     x = (values.day - values.day[0]) / YEAR
+    size = sizes(x[:past], before.value, x)
+    s = _sigmas(_scatter(before, size[:past]) * size, values.sigma)  # of all, the newest too
     floor = float(np.median(values.sigma / s))  # what the events' own sigmas alone make: the past cannot scatter less
     start, slope, scale = _line(x[:past], values.value[:past], s[:past], floor)
     expected = float(start + slope * x[-1])

@@ -2,7 +2,8 @@
 
     y_i = a + b t_i + e_i,    e_i of variance tau^2 + sigma_i^2
 
-sigma_i is each event's own, tau the scatter from event to event (Paule and Mandel's estimate).  The line is Huber's
+sigma_i is each event's own, tau the scatter from event to event (Paule and Mandel's estimate), in proportion to the
+line where the values keep one sign: a mechanism that pushes harder also scatters more.  The line is Huber's
 M-estimate.  Its p-value and intervals come from one permutation test: under the right hypothesis the residuals do not
 know their dates, so that shuffling them tells how large the statistic sum d_i psi(r_i / s_i) gets by chance.  Intervals
 are the hypotheses the test does not refuse; with ten events a normal approximation would be too narrow.
@@ -68,7 +69,7 @@ class Trend:
     @property
     def sigmas(self) -> np.ndarray:
         """One sigma of every event about the line."""
-        return _sigmas(self.scatter, self.values.sigma)
+        return _sigmas(self.scatter * sizes(self.values.share, self.values.value), self.values.sigma)
 
     def power(self, percent: float) -> float:
         """Probability that a change of that size, first to last event, is told from none at 5 %."""
@@ -80,7 +81,11 @@ class Trend:
         w = 1 / s**2
         t = self.values.day
         mean = np.average(t, weights=w)
-        spread = np.sqrt(np.median(s) ** 2 + 1 / w.sum() + (np.asarray(day) - mean) ** 2 / np.sum(w * (t - mean) ** 2))
+        own = np.sqrt(
+            (self.scatter * sizes(self.values.share, self.values.value, (np.asarray(day) - t[0]) / np.ptp(t))) ** 2
+            + np.median(self.values.sigma) ** 2
+        )
+        spread = np.sqrt(own**2 + 1 / w.sum() + (np.asarray(day) - mean) ** 2 / np.sum(w * (t - mean) ** 2))
         reach = stats.t.ppf(0.5 + share / 2, len(t) - 2) * spread
         return self.at(day) - reach, self.at(day) + reach
 
@@ -106,8 +111,9 @@ def trend_of(values: Values) -> Trend:
         raise ValueError("a trend needs three events or more, at different times")
     u = values.share
     one = np.ones_like(u)
-    scatter = _scatter(values)
-    s = _sigmas(scatter, values.sigma)
+    size = sizes(u, y)
+    scatter = _scatter(values, size)
+    s = _sigmas(scatter * size, values.sigma)
     start, rise = (float(x) for x in robust_line(u, y, s))
     left = y - start - rise * u
     scale = _mad(left / s)
@@ -224,17 +230,26 @@ def _mad(z) -> np.ndarray:
     return np.median(np.abs(z), axis=-1) / 0.6745 * np.sqrt(n / max(n - 2, 1))
 
 
-def _sigmas(scatter: float, sigma) -> np.ndarray:
+def sizes(x, y, at=None) -> np.ndarray:
+    """Size of a line through ``y`` over its mean, at ``x`` (or ``at``): what scatter is in proportion to; 1 across zero."""
+    where = x if at is None else at
+    if not (np.all(y > 0) or np.all(y < 0)):
+        return np.ones_like(where)
+    start, slope = robust_line(x, y, np.ones_like(x))
+    return np.clip((start + slope * where) / np.mean(start + slope * x), 0.4, 2.5)
+
+
+def _sigmas(scatter, sigma) -> np.ndarray:
     total = np.sqrt(scatter**2 + sigma**2)
     return np.where(total > 0, total, 1.0)
 
 
-def _scatter(values: Values) -> float:
+def _scatter(values: Values, size) -> float:
     """Event-to-event scatter beyond the events' own sigma: sum of psi(r / s)^2 = N - 2  (Paule and Mandel 1982)."""
     u, y, sigma = values.share, values.value, values.sigma
 
     def excess(tau):
-        s = _sigmas(tau, sigma)
+        s = _sigmas(tau * size, sigma)
         start, slope = robust_line(u, y, s)
         z = (y - start - slope * u) / s
         return np.sum(np.clip(z, -3, 3) ** 2) - (len(y) - 2)
@@ -256,7 +271,10 @@ def _p(y, s, nuisance, direction, scale, orders) -> float:
     for _ in range(8):
         w = np.minimum(1, HUBER * scale / np.maximum(np.abs(z - m * g), 1e-300))
         m = (w * g) @ z / ((w * g) @ g)
-    psi = _psi(z - m * g, scale)
+    left = z - m * g
+    psi = _psi(
+        left, max(scale, float(_mad(left)))
+    )  # far from the right hypothesis everything is large, nothing an outlier
     chance = np.abs(psi[orders] @ d)
     return float((1 + np.sum(chance >= abs(d @ psi) * (1 - 1e-12))) / (1 + len(orders)))
 

@@ -238,7 +238,7 @@ def _judge_figure(f: FigureHealth, trend_p, newest_p, limit) -> FigureHealth:
             )
     if limit is not None and f.trend is not None:
         now = f.rows[-1].value
-        rising = limit >= np.median([r.value for r in f.rows])
+        rising = limit >= f.rows[0].value  # a limit lies beyond where the history began
         if (now >= limit) if rising else (now <= limit):
             said.append(("alarm", f"{name} is past its limit: {now:.3g} against {limit:.3g} {f.unit}"))
         elif len(f.rows) >= FEWEST:
