@@ -30,7 +30,7 @@ stop_postgresql() {
 
 start_postgresql() {
   POSTGRESQL_BIN=$(postgresql_programs) || { install_postgresql >&2 && POSTGRESQL_BIN=$(postgresql_programs); } || return 1
-  POSTGRESQL_HOME=$(mktemp -d /tmp/asflown-postgresql.XXXXXX)
+  POSTGRESQL_HOME=$(mktemp -d /tmp/asflown-postgresql.XXXXXX) || return 1
   trap stop_postgresql EXIT
   trap 'exit 130' INT
   trap 'exit 143' TERM

@@ -94,7 +94,7 @@ def switch_to_wal(engine: Engine) -> None:
     try:
         while True:
             try:
-                raw.driver_connection.execute("PRAGMA journal_mode = WAL")
+                raw.cursor().execute("PRAGMA journal_mode = WAL")
                 return
             except sqlite3.OperationalError as why:  # this pragma does not wait by itself
                 if "locked" not in str(why) or time.monotonic() > until:

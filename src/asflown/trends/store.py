@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from sqlalchemy import Connection, Engine, exists, func, insert, inspect, select, text
@@ -131,7 +131,7 @@ class TrendStore:
             added = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%S")
             entry = replace(entry, revision=(last or 0) + 1, added=added)
             row = {c.name: getattr(entry, c.name) for c in ENTRY.c if c.name != "id"}
-            key = connection.execute(insert(ENTRY).values(row)).inserted_primary_key[0]
+            key = connection.scalars(insert(ENTRY).values(row).returning(ENTRY.c.id)).one()
             if entry.values:
                 rows = [{"entry_id": key, "place": i, **vars(v)} for i, v in enumerate(entry.values)]
                 connection.execute(insert(VALUE), rows)
@@ -193,8 +193,7 @@ class TrendStore:
     def _curve(self, row) -> Curve:
         try:
             with np.load(io.BytesIO(row.data), allow_pickle=False) as arrays:
-                sigma = arrays["sigma"] if "sigma" in arrays else None
-                return Curve(row.name, row.unit, arrays["time_s"], arrays["values"], sigma)
+                return Curve(row.name, row.unit, arrays["time_s"], arrays["values"], arrays.get("sigma"))
         except (ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
             raise BadInput(
                 f"curve {row.name!r} is damaged", file=self, remedy="Restore the store from a backup."
@@ -207,7 +206,7 @@ def _of(table, chosen):
 
 def _packed(curve: Curve) -> bytes:
     """An .npz file: it says itself what it holds, is compressed, and keeps every bit of a float64."""
-    arrays = {"time_s": curve.time_s, "values": curve.values, "sigma": curve.sigma}
+    arrays: dict[str, Any] = {"time_s": curve.time_s, "values": curve.values, "sigma": curve.sigma}
     file = io.BytesIO()
     np.savez_compressed(file, **{k: np.asarray(a, "<f8") for k, a in arrays.items() if a is not None})
     return file.getvalue()
@@ -216,13 +215,10 @@ def _packed(curve: Curve) -> bytes:
 def _ready(entry: Entry) -> Entry:
     """The entry as it will be kept.  Raises BadInput where it contradicts itself or cannot be written down."""
     where = f"entry {entry.event!r} of {entry.craft!r}"
-    for what, names in (
-        ("figure", [(v.figure, v.basis) for v in entry.values]),
-        ("curve", [c.name for c in entry.curves]),
-    ):
-        twice = next((n for n in names if names.count(n) > 1), None)
-        if twice is not None:
-            raise BadInput(f"{where} has the {what} {twice} twice", remedy="Each may be there once.")
+    names = [f"figure {v.figure} ({v.basis})" for v in entry.values] + [f"curve {c.name}" for c in entry.curves]
+    twice = next((n for n in names if names.count(n) > 1), None)
+    if twice is not None:
+        raise BadInput(f"{where} has the {twice} twice", remedy="Each may be there once.")
     for c in entry.curves:
         shapes = {np.shape(a) for a in (c.time_s, c.values, c.sigma) if a is not None}
         if len(shapes) > 1 or len(next(iter(shapes))) != 1:
@@ -232,7 +228,7 @@ def _ready(entry: Entry) -> Entry:
     texts = [entry.craft, entry.event, entry.kind, entry.date, entry.motor or "", entry.note, *entry.doubts]
     texts += [t for v in entry.values for t in (v.figure, v.basis, v.unit)]
     texts += [t for c in entry.curves for t in (c.name, c.unit)]
-    if any("\0" in t or not t.isascii() and t.encode(errors="ignore").decode() != t for t in texts):
+    if any("\0" in t or t.encode(errors="ignore").decode() != t for t in texts):
         raise BadInput(f"{where} has text that no database keeps (NUL or half a character)", remedy="Take it out.")
     if not (entry.craft and entry.event):
         raise BadInput("an entry without craft or event", remedy="Name both.")
