@@ -206,9 +206,10 @@ def _of(table, chosen):
 
 def _packed(curve: Curve) -> bytes:
     """An .npz file: it says itself what it holds, is compressed, and keeps every bit of a float64."""
-    arrays: dict[str, Any] = {"time_s": curve.time_s, "values": curve.values, "sigma": curve.sigma}
+    given = {"time_s": curve.time_s, "values": curve.values, "sigma": curve.sigma}
+    arrays: dict[str, Any] = {k: np.asarray(a, "<f8") for k, a in given.items() if a is not None}
     file = io.BytesIO()
-    np.savez_compressed(file, **{k: np.asarray(a, "<f8") for k, a in arrays.items() if a is not None})
+    np.savez_compressed(file, **arrays)
     return file.getvalue()
 
 
