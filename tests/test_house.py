@@ -57,7 +57,7 @@ def test_help_loads_nothing_heavy():
         "import sys; sys.argv = ['asflown', '--help']\n"
         "from asflown.cli.main import main\n"
         "try: main()\nexcept SystemExit as e: assert e.code == 0, e.code\n"
-        "heavy = {'numpy', 'pydantic', 'astropy', 'scipy', 'matplotlib', 'numba'} & set(sys.modules)\n"
+        "heavy = {'numpy', 'pydantic', 'astropy', 'scipy', 'matplotlib', 'numba', 'sqlalchemy'} & set(sys.modules)\n"
         "assert not heavy, heavy"
     )
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
