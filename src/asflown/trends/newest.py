@@ -67,8 +67,9 @@ def newest_of(values: Values) -> Newest | None:
     chance, own = apart / drawn, np.std(apart) / drawn
     usual = np.std(apart) * scale / _usual(drawn)
     difference = values.value[-1] - expected
-    if scale == 0:
-        p, reach = (1.0 if np.isclose(difference, 0, atol=1e-12 * max(abs(expected), 1)) else 0.0), 0.0
+    same = 1e-9 * np.max(np.abs(before.value))
+    if scale * np.median(s) <= same:  # the past never differed: any difference is news
+        p, reach, usual = (1.0 if abs(difference) <= same else 0.0), 0.0, 0.0
     else:
         p = float((1 + np.sum(np.abs(chance) >= abs(difference / scale))) / (1 + DRAWS))
         reach = float(np.quantile(np.abs(chance), 0.95) * scale)

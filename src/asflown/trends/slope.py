@@ -202,6 +202,8 @@ def power_of_slope(change: float, residual: float, share) -> float:
     freedom = len(share) - 2
     edge = stats.t.ppf(0.975, freedom)
     away = change / _error_of_rise(residual, share)
+    if away > 30:  # beyond the distribution's numerics, and certain
+        return 1.0
     return float(stats.nct.sf(edge, freedom, away) + stats.nct.cdf(-edge, freedom, away))
 
 

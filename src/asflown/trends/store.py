@@ -18,6 +18,7 @@ from sqlalchemy import Connection, Engine, exists, func, insert, inspect, select
 from sqlalchemy.engine import URL
 
 from ..kit.errors import BadInput, some_of
+from ..kit.plain import plain
 from .entry import Curve, Entry, Value
 from .place import label, plainly, reach, switch_to_wal, url_of
 from .schema import CURVE, ENTRY, HEAD, VALUE, VERSION_TABLE
@@ -234,21 +235,8 @@ def _ready(entry: Entry) -> Entry:
     if not (entry.craft and entry.event):
         raise BadInput("an entry without craft or event", remedy="Name both.")
     values = tuple(replace(v, value=_finite(v.value), sigma=_finite(v.sigma)) for v in entry.values)
-    return replace(entry, values=values, doubts=tuple(entry.doubts), provenance=_plain(entry.provenance))
+    return replace(entry, values=values, doubts=tuple(entry.doubts), provenance=plain(entry.provenance))
 
 
 def _finite(number: float | None) -> float | None:
     return None if number is None or not math.isfinite(number) else float(number)
-
-
-def _plain(thing):
-    """As JSON holds it: numbers that are not finite are None, paths and dates are text."""
-    if isinstance(thing, dict):
-        return {str(k): _plain(v) for k, v in thing.items()}
-    if isinstance(thing, list | tuple):
-        return [_plain(v) for v in thing]
-    if isinstance(thing, np.generic | np.ndarray):
-        return _plain(thing.tolist())
-    if isinstance(thing, float):
-        return _finite(thing)
-    return thing if thing is None or isinstance(thing, bool | int | str) else str(thing)
