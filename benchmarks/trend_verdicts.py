@@ -128,7 +128,8 @@ def campaign(pool, runs: int) -> dict:
 
 def flown(seed: int) -> dict:
     """A mission flown in the closed loop, analysed from its telemetry and judged; the truth beside the answer."""
-    from asflown.sim.mission import fly_mission, load_mission
+    from asflown.sim.fly_mission import fly_mission
+    from asflown.sim.mission import load_mission
 
     from asflown.craft.load import load_craft
     from asflown.trends.analyse import analyse
@@ -141,7 +142,7 @@ def flown(seed: int) -> dict:
     return {
         f.figure: (f.trend.change_percent, *f.trend.change_percent_ci95) for f in health.figures
         if f.basis == "fused" and f.figure in ("angular_impulse", "peak_positive", "peak_negative")
-    } | {"verdict": health.verdict}  # fmt: skip
+    } | {"verdict": health.verdict, "reasons": health.reasons, "shape_p": health.shape.p_value}  # fmt: skip
 
 
 def fly_missions(pool, runs: int) -> list[dict]:
@@ -151,6 +152,8 @@ def fly_missions(pool, runs: int) -> list[dict]:
         inside = np.mean((found[:, 1] <= true) & (true <= found[:, 2]))
         print(f"{name:18s} true {true:+.0f} %  mean {found[:, 0].mean():+.1f} +- {found[:, 0].std() / np.sqrt(runs):.1f} %  "
               f"interval holds {inside:.2f} of {runs}")  # fmt: skip
+    print("shape's p:", " ".join(f"{p:.2g}" for p in sorted(r["shape_p"] for r in rows)))
+    print("alarms:", [x for r in rows for x in r["reasons"] if "out of line" in x])
     print("verdicts:", {v: sum(r["verdict"] == v for r in rows) for v in ("pass", "watch", "alarm")})
     return rows
 

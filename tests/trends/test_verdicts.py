@@ -90,12 +90,13 @@ def test_law_distance_is_symmetric_and_nothing_to_itself():
 
 
 def test_recovery_a_new_shape_is_seen_and_a_new_size_is_left_to_the_figures():
-    past = [e.curve("torque, fused") for e in history(curves=True, seed=4) if e.kind == "deploy"]
+    deploys = [e for e in history(curves=True, seed=4) if e.kind == "deploy"]
+    past, day = [e.curve("torque, fused") for e in deploys], np.array([e.day for e in deploys])
     wide = Curve("torque, fused", "N m", TIME, torque(TIME) + 0.006 * np.exp(-(((TIME - 40) / 8) ** 2)))
-    assert shape_of(past[-1], past[:-1]).p_value > 0.02
-    assert shape_of(replace(past[-1], values=1.4 * past[-1].values), past[:-1]).p_value > 0.02
-    assert shape_of(wide, past[:-1]).p_value < 0.01
-    assert shape_of(past[-1], past[:4]) is None
+    assert shape_of(past[-1], past[:-1], day).p_value > 0.02
+    assert shape_of(replace(past[-1], values=1.4 * past[-1].values), past[:-1], day).p_value > 0.02
+    assert shape_of(wide, past[:-1], day).p_value < 0.01
+    assert shape_of(past[-1], past[:5], day[:6]) is None
 
 
 def test_recovery_verdicts_of_a_change_and_of_none():

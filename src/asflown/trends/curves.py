@@ -19,7 +19,7 @@ START_S, STOP_S, STEP_S = 0.0, 240.0, 1.0
 _SHIFT_S, _STRETCH = 8.0, 0.06
 TORQUE = "torque, fused"
 #: Past curves needed to judge the shape of a new one.
-FEWEST_CURVES = 5
+FEWEST_CURVES = 6
 
 
 @dataclass(frozen=True)
@@ -73,20 +73,25 @@ def distance(a: Curve, b: Curve) -> float:
     return float(np.mean(both))
 
 
-def shape_of(newest: Curve, past: list[Curve]) -> Shape | None:
-    """The newest curve's shape against the family's, size put aside; None with fewer than five past curves.
+def shape_of(newest: Curve, past: list[Curve], day) -> Shape | None:
+    """The newest curve's shape against the family's, size put aside; None with fewer than six past curves.
 
-    The family's band is the mean and scatter of the past, registered.  A past curve's own distance is to the band
-    of the others.  The logarithm of the newest's distance is set against theirs (Student's t)."""
+    ``day``: of the past curves and the newest, in that order.  A shape may drift over the years, so every instant of
+    the registered curves has its own line over the dates.  A past curve lies as far from the line of the others as it
+    does, in the scatter there; the newest from that of all past ones.  The logarithm of its distance is set against
+    theirs (Student's t)."""
     if len(past) < FEWEST_CURVES:
         return None
     onto = np.median([_at(c, instants())[0] for c in past], axis=0)
-    family = [registered(c, onto, scaled=True) for c in past]
-    values = np.array([v for v, _ in family])
+    values = np.array([registered(c, onto, scaled=True)[0] for c in past])
     new, _ = registered(newest, onto, scaled=True)
-    own = np.array([_apart(values[k], np.delete(values, k, axis=0)) for k in range(len(past))])
-    # leave-one-out bands hold one curve fewer: judge the newest against as many
-    apart = float(np.median([_apart(new, np.delete(values, k, axis=0)) for k in range(len(past))]))
+    own = np.array([
+        _apart(values[k], np.delete(values, k, axis=0), day[k], np.delete(day[:-1], k)) for k in range(len(past))
+    ])  # fmt: skip
+    # lines of the others hold one curve fewer: judge the newest against as many
+    apart = float(np.median([
+        _apart(new, np.delete(values, k, axis=0), day[-1], np.delete(day[:-1], k)) for k in range(len(past))
+    ]))  # fmt: skip
     logs = np.log(own)
     z = (np.log(apart) - logs.mean()) / (logs.std(ddof=1) * np.sqrt(1 + 1 / len(own)))
     return Shape(apart, float(np.median(own)), float(stats.t.sf(z, len(own) - 1)))
@@ -100,11 +105,17 @@ def family_band(curves: list[Curve], share: float = 0.95) -> tuple[np.ndarray, n
     return instants(), values.mean(axis=0) - reach, values.mean(axis=0) + reach
 
 
-def _apart(curve, family) -> float:
-    """rms over time of a curve's difference from a family's mean, in its scatter (no smaller than a tenth of the usual)."""
-    scatter = family.std(axis=0, ddof=1)
+def _apart(curve, family, day: float, days) -> float:
+    """rms over time of a curve's difference from the family's lines at its date, in what such a difference scatters.
+
+    The scatter is taken to be no smaller than a tenth of the usual."""
+    X = np.column_stack([np.ones(len(days)), days - np.mean(days)])
+    inverse = np.linalg.inv(X.T @ X)
+    lines = inverse @ X.T @ family
+    x = np.array([1.0, day - np.mean(days)])
+    scatter = np.sqrt(np.sum((family - X @ lines) ** 2, axis=0) / (len(days) - 2) * (1 + x @ inverse @ x))
     floor = 0.1 * np.sqrt(np.mean(scatter**2))
-    return float(np.sqrt(np.mean(((curve - family.mean(axis=0)) / np.maximum(scatter, floor)) ** 2)))
+    return float(np.sqrt(np.mean(((curve - x @ lines) / np.maximum(scatter, floor)) ** 2)))
 
 
 def _size(values, onto) -> float:

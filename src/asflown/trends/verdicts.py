@@ -204,8 +204,11 @@ def _figure(entries: list[Entry], name: str, basis: str) -> FigureHealth:
 
 
 def _shape(entries: list[Entry]) -> Shape | None:
-    curves = [c for e in entries if (c := e.curve(TORQUE)) is not None]
-    return shape_of(curves[-1], curves[:-1]) if curves and entries[-1].curve(TORQUE) is not None else None
+    drawn = [(c, e.day) for e in entries if (c := e.curve(TORQUE)) is not None]
+    if not drawn or entries[-1].curve(TORQUE) is None:
+        return None
+    curves, days = zip(*drawn, strict=True)
+    return shape_of(curves[-1], list(curves[:-1]), np.array(days))
 
 
 def _judge_figure(f: FigureHealth, trend_p, newest_p, limit) -> FigureHealth:
