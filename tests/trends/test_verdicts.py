@@ -100,8 +100,8 @@ def test_recovery_a_new_shape_is_seen_and_a_new_size_is_left_to_the_figures():
 
 
 def test_recovery_verdicts_of_a_change_and_of_none():
-    still = judge(history(curves=True, seed=2))
-    assert still.verdict in ("pass", "watch") and not any("out of line" in r for r in still.reasons)
+    alarms = [judge(history(curves=True, seed=seed)).verdict == "alarm" for seed in range(8)]
+    assert sum(alarms) <= 2  # one in twenty looks
     moving = judge(history(change=0.4, seed=2))
     assert moving.verdict == "watch"
     assert "angular_impulse has grown by" in moving.reasons[0]

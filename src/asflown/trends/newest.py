@@ -57,7 +57,9 @@ def newest_of(values: Values) -> Newest | None:
     before = values.first(past)
     x = (values.day - values.day[0]) / YEAR
     size = sizes(x[:past], before.value, x)
-    s = _sigmas(_scatter(before, size[:past]) * size, values.sigma)  # of all, the newest too
+    # scatter that so few events cannot exclude: half of its square's standard error, where the events' own sigmas hide it
+    hidden = 0.5 * np.median(before.sigma) ** 2 * np.sqrt(2 / (past - 2))
+    s = _sigmas(np.sqrt(max(_scatter(before, size[:past]) ** 2, hidden)) * size, values.sigma)  # of all, the newest too
     floor = float(np.median(values.sigma / s))  # what the events' own sigmas alone make: the past cannot scatter less
     start, slope, scale = _line(x[:past], values.value[:past], s[:past], floor)
     expected = float(start + slope * x[-1])
