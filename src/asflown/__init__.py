@@ -25,6 +25,9 @@ _PUBLIC = {
     "write_flight": "asflown.sim.fly",
     "figure_of_merit": "asflown.trends.figures",
     "TrendStore": "asflown.trends.store",
+    "Mission": "asflown.sim.mission",
+    "load_mission": "asflown.sim.mission",
+    "fly_mission": "asflown.sim.fly_mission",
     "error_budget": "asflown.campaigns.budget",
 }
 
@@ -50,6 +53,8 @@ if TYPE_CHECKING:
     from asflown.estimate.torque import disturbance_torque
     from asflown.kit.errors import BadInput
     from asflown.sim.fly import fly, write_flight
+    from asflown.sim.fly_mission import fly_mission
+    from asflown.sim.mission import Mission, load_mission
     from asflown.sim.scenario import Scenario, load_scenario
     from asflown.telemetry.load import load_telemetry
     from asflown.telemetry.tables import write_table

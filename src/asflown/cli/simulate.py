@@ -11,8 +11,8 @@ from .output import print_doubts, print_json, progress, provenance
 
 
 def simulate(
-    scenario: str = typer.Argument(help="A shipped scenario (profile-1, cover-deploy, …) or a TOML file."),
-    out: Path = typer.Option(..., "--out", help="Directory for telemetry.csv, truth.csv and truth.json."),
+    scenario: str = typer.Argument(help="A shipped scenario (profile-1, cover-deploy, …), a mission (cassini-mission), or a TOML file."),
+    out: Path = typer.Option(..., "--out", help="Directory for telemetry.csv, truth.csv and truth.json; of a mission, for events.toml."),
     craft: str = typer.Option(None, "--craft", help="A built-in craft or a TOML file, instead of the scenario's."),
     seed: int = typer.Option(None, "--seed", min=0, help="Another draw of the noise."),
     noise: str = typer.Option(None, "--noise", help="none, half, nominal or double."),
@@ -23,14 +23,18 @@ def simulate(
     """Fly a scenario in the closed loop: telemetry as a spacecraft would send it, and the truth beside it."""
     from asflown.kit.files import check_folder
     from asflown.sim.fly import fly, write_flight
+    from asflown.sim.mission import is_mission
     from asflown.sim.scenario import load_scenario
 
     check_folder(out)
+    options = {"craft": craft, "noise": noise, "inertia": inertia, "cm": cm}
+    if is_mission(scenario):
+        _simulate_mission(scenario, out, seed, options, json)
+        return
     plan = load_scenario(scenario)
     vehicle = craft_from(craft or plan.craft, inertia, cm)
     flight = fly(plan, craft=vehicle, seed=seed, noise=noise, progress=progress())
     files = write_flight(flight, out)
-    options = {"craft": craft, "noise": noise, "inertia": inertia, "cm": cm}
     if json:
         print_json({
             "command": "simulate",
@@ -46,3 +50,29 @@ def simulate(
     for path in files.values():
         print(f"  {path}")
     print_doubts(flight.doubts)
+
+
+def _simulate_mission(name: str, out: Path, seed: int | None, options: dict, json: bool) -> None:
+    from asflown.sim.fly_mission import fly_mission
+    from asflown.sim.mission import load_mission
+
+    mission = load_mission(name)
+    vehicle = craft_from(options["craft"] or mission.craft, options["inertia"], options["cm"])
+    done = fly_mission(mission, out, craft=vehicle, seed=seed, noise=options["noise"], progress=progress())
+    events, truth = out / "events.toml", out / "mission.json"
+    if json:
+        print_json({
+            "command": "simulate",
+            "mission": done["mission"],
+            "events": events,
+            "flown": done["flown"],
+            "listed": done["listed"],
+            "truth": truth,
+            "seed": done["seed"],
+            "doubts": done["doubts"],
+            "provenance": provenance(hashes(name, options["craft"]), options, done["seed"]),
+        })  # fmt: skip
+        return
+    counts = f"{done['flown']} flown of {done['listed']} listed"
+    print(f"{done['mission']}: {counts} (seed {done['seed']}, noise {done['noise']})\n  {events}\n  {truth}")
+    print_doubts(done["doubts"])

@@ -75,6 +75,15 @@ def _motion(cover: CoverMotion, travel: float) -> tuple[np.ndarray, np.ndarray]:
     return np.ascontiguousarray(angle.x), np.ascontiguousarray(quartics)
 
 
+def momentum_per_rate(part: MovingPart, angles) -> np.ndarray:
+    """Momentum of the part, the body still, for one rad/s about its hinge: C k + mu r x r', (N, 3). [N m s per rad/s]"""
+    k = part.hinge_axis
+    turned = Rotation.from_rotvec(np.outer(angles, k))
+    arm = turned.apply(part.arm)
+    own = turned.apply(turned.apply(np.tile(k, (len(arm), 1)), inverse=True) @ part.part_inertia)
+    return own + part.reduced_mass * np.cross(part.hinge + arm, np.cross(k, arm))
+
+
 def motor_telemetry(cover: CoverMotion, part: MovingPart, times, angle) -> dict[str, np.ndarray]:
     """Readings at ``times`` for the part's angle from stowed: one array a channel, states as words."""
     times = np.asarray(times, float)
