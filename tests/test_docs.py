@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from asflown.sim import scenario
+from asflown.sim import mission, scenario
 from asflown.telemetry import dictionary
 from asflown.telemetry.channels import KINDS
 
@@ -80,6 +80,15 @@ def test_simulator_page_lists_every_scenario_key():
     text = section(page("simulator.md"), "Scenario keys")
     assert keys_in(text) == fields
     assert all(re.search(rf"\[[a-z.\[]*{t}\]", text) for t in tables | {"torques"})
+
+
+def test_simulator_page_lists_every_mission_key():
+    models = (mission.Mission, mission.Ageing, mission.Scatter, mission.Cold, mission.Fault, mission.Motion, mission.CraftMass,
+              mission.Actuation)  # fmt: skip
+    tables = {"ageing", "scatter", "cold", "faults", "motions", "craft_mass", "events"}  # named in the first column
+    text = section(page("simulator.md"), "Missions")
+    assert keys_in(text) == {k for m in models for k in m.model_fields} - tables
+    assert all(re.search(rf"\[{t}[\].]", text) for t in tables)
 
 
 def test_simulator_page_lists_the_shipped_scenarios_and_its_example_flies(tmp_path):

@@ -11,8 +11,12 @@ from .output import print_doubts, print_json, progress, provenance
 
 
 def simulate(
-    scenario: str = typer.Argument(help="A shipped scenario (profile-1, cover-deploy, …), a mission (cassini-mission), or a TOML file."),
-    out: Path = typer.Option(..., "--out", help="Directory for telemetry.csv, truth.csv and truth.json; of a mission, for events.toml."),
+    scenario: str = typer.Argument(
+        help="A shipped scenario (profile-1, cover-deploy, …), a mission (cassini-mission), or a TOML file."
+    ),
+    out: Path = typer.Option(
+        ..., "--out", help="Directory for telemetry.csv, truth.csv and truth.json; of a mission, for events.toml."
+    ),
     craft: str = typer.Option(None, "--craft", help="A built-in craft or a TOML file, instead of the scenario's."),
     seed: int = typer.Option(None, "--seed", min=0, help="Another draw of the noise."),
     noise: str = typer.Option(None, "--noise", help="none, half, nominal or double."),

@@ -18,8 +18,8 @@ from ..kit.timeline import utc_to_tai_ns
 from ..telemetry.tables import write_table
 from .ageing import Figures, aged, figures_of
 from .fly import fly
-from .mission import Actuation, Mission, load_mission
-from .scenario import Scenario, load_scenario
+from .mission import Actuation, Cold, Fault, Mission, load_mission
+from .scenario import CoverMotion, Scenario, load_scenario
 from .sensors import stream
 
 #: truth.csv of an event has a row this often, not one a control cycle as a flight's own. [s]
@@ -32,6 +32,7 @@ class Planned:
 
     event: Actuation
     scenario: Scenario
+    cover: CoverMotion  # the scenario's
     line: Figures  # where the ageing law alone puts the figures
     factors: dict[str, float]  # what faults and a cold start do to them
     wanted: Figures  # with factors and scatter
@@ -39,7 +40,9 @@ class Planned:
     cold: bool
 
 
-def fly_mission(mission, out: str | Path, *, craft=None, seed: int | None = None, noise: str | None = None, progress=None):
+def fly_mission(
+    mission, out: str | Path, *, craft=None, seed: int | None = None, noise: str | None = None, progress=None
+):
     """Fly a mission, a shipped one by name, a TOML file, or a ``Mission``, and write it to the folder ``out``.
 
     Writes <event>/telemetry.csv and <event>/truth.csv (every half second) for each event flown, mission.json with the
@@ -62,9 +65,9 @@ def fly_mission(mission, out: str | Path, *, craft=None, seed: int | None = None
     records, doubts = [], []
     for number, p in enumerate(planned, start=1):
         flight = fly(p.scenario, craft=craft)
-        if flight.truth.time_s[-1] < p.scenario.cover.motor_off:
+        if flight.truth.time_s[-1] < p.cover.motor_off:
             raise BadInput(f"event {p.event.name!r}: {flight.ended}", remedy="Lower most_wheel_rate.")
-        true = figures_of(flight.truth.time_s, flight.truth.torque_Nm[:, 1], p.scenario.cover.motor_on)
+        true = figures_of(flight.truth.time_s, flight.truth.torque_Nm[:, 1], p.cover.motor_on)
         write_text(folder / p.event.name / "truth.csv", _thinned_truth(flight))
         write_table(flight.telemetry, folder / p.event.name / "telemetry.csv")
         records.append(_event_record(p, flight, true))
@@ -98,9 +101,9 @@ def plan_mission(mission: Mission, craft: Craft) -> list[Planned]:
         sigma = np.array([mission.scatter.impulse_percent, *[mission.scatter.excursion_percent] * 2]) / 100
         by = (1 + sigma * normal) * [factors["impulse"], factors["excursion"], factors["excursion"]]
         wanted = Figures(*(by * [line.impulse_Nms, line.peak_positive_Nm, line.peak_negative_Nm]).tolist())
-        pattern = patterns[event.kind]
+        pattern, cover = patterns[event.kind]
         try:
-            cover = pattern.cover.model_copy(update={"craft_mass": mission.mass_kg(event.tai_ns)})
+            cover = cover.model_copy(update={"craft_mass": mission.mass_kg(event.tai_ns)})
             motion, _ = aged(cover, now, wanted, late)
             scenario = pattern.changed(
                 name=event.name, epoch=event.date, seed=seed, noise=mission.noise, cover=_as_written(motion),
@@ -108,7 +111,7 @@ def plan_mission(mission: Mission, craft: Craft) -> list[Planned]:
             )  # fmt: skip
         except BadInput as why:
             raise BadInput(f"event {event.name!r}: {why.what}", remedy=why.remedy) from None
-        planned.append(Planned(event, scenario, line, factors, wanted, rest, cold))
+        planned.append(Planned(event, scenario, motion, line, factors, wanted, rest, cold))
     return planned
 
 
@@ -139,14 +142,14 @@ def trend_of(records) -> dict:
 def _factors(mission: Mission, event: Actuation, cold: bool) -> dict[str, float]:
     until_now = [e.name for e in mission.events if e.tai_ns <= event.tai_ns]
     struck = [f for f in mission.faults if f.kind in (None, event.kind) and f.since in until_now]
-    active = [*struck, *([mission.cold] if cold else [])]
+    active: list[Fault | Cold] = [*struck, *([mission.cold] if cold else [])]
     return {
         "impulse": float(np.prod([f.impulse_factor for f in active])),
         "excursion": float(np.prod([f.excursion_factor for f in active])),
     }
 
 
-def _pattern(mission: Mission, kind) -> Scenario:
+def _pattern(mission: Mission, kind) -> tuple[Scenario, CoverMotion]:
     motion = mission.motions[kind]
     scenario = load_scenario(mission.folder / motion.scenario if motion.scenario.endswith(".toml") else motion.scenario)
     if scenario.cover is None or scenario.cover.direction != kind or scenario.torques or scenario.slews:
@@ -159,7 +162,7 @@ def _pattern(mission: Mission, kind) -> Scenario:
             f"motions.{kind}: the impulse has the wrong sign",
             remedy="That of a deployment is negative, of a stow positive: the body is pushed against the part's turn.",
         )
-    return scenario
+    return scenario, scenario.cover
 
 
 def _as_written(cover) -> dict:
@@ -197,7 +200,7 @@ def _three(f: Figures) -> dict[str, float]:
 
 
 def _event_record(p: Planned, flight, true: Figures) -> dict:
-    cover = p.scenario.cover
+    cover = p.cover
     others = {
         "peak_momentum_Nms": true.peak_momentum_Nms,
         "net_impulse_Nms": true.net_impulse_Nms,
@@ -227,7 +230,11 @@ def _event_record(p: Planned, flight, true: Figures) -> dict:
 def _mission_record(mission: Mission, craft: Craft, records, doubts) -> dict:
     law = mission.ageing
     start = {
-        kind: {"angular_impulse_Nms": m.impulse, "peak_positive_Nm": m.peak_positive, "peak_negative_Nm": m.peak_negative}
+        kind: {
+            "angular_impulse_Nms": m.impulse,
+            "peak_positive_Nm": m.peak_positive,
+            "peak_negative_Nm": m.peak_negative,
+        }
         for kind, m in mission.motions.items()
     }
     return {
@@ -262,7 +269,7 @@ def _mission_record(mission: Mission, craft: Craft, records, doubts) -> dict:
 
 
 def _event_list(mission: Mission, planned) -> str:
-    covers = {p.event.name: p.scenario.cover for p in planned}
+    covers = {p.event.name: p.cover for p in planned}
     lines = [
         f"# Simulated: {mission.name}, seed {mission.seed}. {len(covers)} of {len(mission.events)} actuations are flown;",
         "# those without a file count for dormancy and cycles only.",
