@@ -7,7 +7,7 @@ from pathlib import Path
 import typer
 
 from .options import JSON
-from .output import print_doubts, print_json, provenance, say
+from .output import plain, print_doubts, print_json, provenance, say, wrapped
 
 SEED = 2016
 PROFILES = {"profile-1": ("Table 3", "21"), "profile-2": ("Table 4", "22")}
@@ -43,9 +43,10 @@ def demo(
         tables = [_profile(name, out, step) for name in PROFILES]
         cover = _cover(out, step)
         bar.update(task, description="done", completed=9)
+    mission = _mission(out / "mission")
     if json:
         print_json({
-            "command": "demo", "tables": tables, "cover": cover, "out": str(out), "doubts": cover["doubts"],
+            "command": "demo", "tables": tables, "cover": cover, "mission": mission, "out": str(out), "doubts": cover["doubts"],
             "provenance": provenance({}, {"out": str(out)}, SEED),
         })  # fmt: skip
         return
@@ -53,6 +54,7 @@ def demo(
         _print_table(table)
     _print_cover(cover)
     say(f"figures and telemetry: {out}/")
+    _print_mission(mission)
 
 
 def _fly(name: str, out: Path, noise: str):
@@ -145,6 +147,50 @@ def _cover(out: Path, step) -> dict:
         save(figure, out / f"{name}.svg")
     both = compare_torques(t_hrwa, t_tf, "y")
     return actuation_summary(telemetry, t_hrwa, both, stall) | {"doubts": list(results[WAYS[4]].doubts)}
+
+
+def _mission(out: Path) -> dict:
+    """Eleven years of a cover flown, analysed, kept and judged, as `simulate`, `trend add` and `report` do; beside the truth."""
+    from asflown.craft.load import load_craft
+    from asflown.report.page import write_report
+    from asflown.sim.fly_mission import fly_mission
+    from asflown.trends.events import load_events
+    from asflown.trends.store import TrendStore
+
+    from .trend import analysed, health_of
+
+    say("a mission of 20 actuations: flying")
+    truth = fly_mission("cassini-mission", out, seed=SEED)
+    store = out / "trends.db"
+    entries = analysed(load_events(out / "events.toml"), load_craft("cassini"))
+    with TrendStore.open(store) as trends:
+        trends.add(entries)
+    say("judging and drawing")
+    healths, others = health_of(str(store), None, [])
+    page = out / "report.html"
+    write_report(healths, others, page, plain(provenance({}, {"store": str(store)}, SEED)))
+    deploys = healths[0]
+    wanted = {name.rpartition("_N")[0]: v for name, v in truth["law"]["change_percent"].items()}
+    changes = [
+        {"figure": name, "flown_percent": wanted[name], "change_percent": (t := deploys.figure(name).trend).change_percent,
+         "change_percent_ci95": list(t.change_percent_ci95)} for name in wanted
+    ]  # fmt: skip
+    return {
+        "changes": changes, "verdict": deploys.verdict, "reasons": list(deploys.reasons), "report": str(page),
+        "events": len(entries),
+    }  # fmt: skip
+
+
+def _print_mission(m: dict) -> None:
+    print(f"\nmission: {m['events']} actuations in eleven years    flown here      found   95 % interval")
+    for c in m["changes"]:
+        low, high = c["change_percent_ci95"]
+        print(
+            f"  change of {c['figure']:32s} {c['flown_percent']:+10.0f} % {c['change_percent']:+8.0f} %   {low:+.0f} to {high:+.0f} %"
+        )
+    for reason in m["reasons"]:
+        print(wrapped("  ", reason))
+    print(f"report: {m['report']}\nverdict: {m['verdict']}")
 
 
 def _print_table(table: dict) -> None:

@@ -45,7 +45,7 @@ def add(
     ship = craft_from(craft, None, None)
     chosen, inputs = _events(events, ship, channels, only)
     TrendStore.open(store).close()  # a store that cannot be written should say so before the work
-    entries = _analysed(chosen, ship, craft, channels, figures, jobs)
+    entries = analysed(chosen, ship, channels, figures, jobs)
     options = {"craft": craft, "channels": channels, "figures": figures, "only": only}
     origin = provenance(inputs | hashes(craft, channels, figures), options)
     kept_with = {
@@ -232,7 +232,7 @@ def _events(path: Path, ship, channels, only: str | None):
     return found, hashes(path)
 
 
-def _analysed(events, ship, craft: str, channels, figures, jobs: int):
+def analysed(events, ship, channels=None, figures=None, jobs: int = 0):
     """Entries of all events, in order; nothing is kept before all are sound."""
     import os
     from concurrent.futures import ProcessPoolExecutor
