@@ -172,7 +172,7 @@ def _torque_axes(ax, title: str, last_s: float | None = None) -> None:
     ax.set_ylabel("torque about the hinge [mN m]")
     ax.set_xlim(-0.7, (last_s or 360.0) / 60)
     if ax.get_legend_handles_labels()[0]:
-        ax.legend(frameon=False, fontsize=8, loc="upper right", ncols=2)
+        ax.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(0, -0.16), ncols=3)
 
 
 def _with_sigma(value, scale: float = 1.0) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 from ..kit.files import write_text
 from ..kit.plain import plain
 from ..plots import trend as draw
-from ..plots.figure import GREY, save_svg
+from ..plots.figure import BLUE, GREY, save_svg
 from ..trends.entry import Entry
 from ..trends.record import health_record
 from ..trends.verdicts import FigureHealth, Health
@@ -123,8 +123,14 @@ def _svg(figure, name: str) -> str:
     text = re.sub(r'(url\(#|href="#)', rf"\1{name}-", text)
     for k, grey in enumerate(draw.GREYS):
         text = text.replace(grey, f"var(--g{k})")
-    for old, new in ((_INK, "currentColor"), ("#000000", "currentColor"), (_GRID, "var(--grid)"), (GREY, "var(--mid)")):
-        text = text.replace(old, new)
+    for old, new in (
+        (_INK, "currentColor"),
+        ("#000000", "currentColor"),
+        (_GRID, "var(--grid)"),
+        (GREY, "var(--mid)"),
+        (BLUE, "var(--blue)"),
+    ):
+        text = text.replace(old, new).replace(old.lower(), new)
     return text
 
 
