@@ -8,14 +8,13 @@ postgresql_programs() {  # the folder of initdb and pg_ctl
 }
 
 install_postgresql() {
-  local root=()
+  local root=() apt
   [ "$(id -u)" = 0 ] || root=(sudo -n)
-  command -v apt-get >/dev/null || return 1
-  # Only the programs: no cluster of the system's own.
-  "${root[@]}" mkdir -p /etc/postgresql-common || return 1
-  [ -e /etc/postgresql-common/createcluster.conf ] ||
-    echo "create_main_cluster = false" | "${root[@]}" tee /etc/postgresql-common/createcluster.conf >/dev/null || return 1
-  "${root[@]}" apt-get update -qq && "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq postgresql
+  apt=("${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq)
+  command -v apt-get >/dev/null && "${apt[@]}" update && "${apt[@]}" install -y postgresql-common || return 1
+  # Only the programs: no server of the system's own.
+  "${root[@]}" sed -ri 's/^#?create_main_cluster .*/create_main_cluster = false/' /etc/postgresql-common/createcluster.conf || true
+  "${apt[@]}" install -y postgresql
 }
 
 as_postgresql_user() {  # initdb and the server refuse to run as root

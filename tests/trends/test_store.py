@@ -8,6 +8,7 @@ import random
 import sqlite3
 import subprocess
 import sys
+import threading
 import time
 from contextlib import contextmanager
 from dataclasses import replace
@@ -334,6 +335,42 @@ def test_law_two_that_open_a_new_store_at_once_both_get_it(fresh):
     finally:
         for p in writers:
             killed(p)
+
+
+def test_law_a_new_store_waits_for_whoever_holds_its_file(tmp_path):
+    path = tmp_path / "trends.db"
+    other = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
+    other.execute("BEGIN IMMEDIATE")
+    letting_go = threading.Timer(0.3, other.rollback)
+    letting_go.start()
+    with TrendStore.open(path) as store:
+        assert store.add(entry("a"))[0].revision == 1
+    letting_go.join()
+    other.close()
+
+
+def test_law_sqlite_has_a_commit_on_the_disk_before_it_says_so(tmp_path):
+    TrendStore.open(tmp_path / "trends.db").close()
+    with raw(tmp_path / "trends.db") as c:
+        assert c.scalar(text("PRAGMA journal_mode")) == "wal"
+        assert c.scalar(text("PRAGMA synchronous")) == 2  # FULL
+        assert c.scalar(text("PRAGMA foreign_keys")) == 1
+
+
+def test_law_a_copy_made_while_the_store_is_open_is_a_store(tmp_path):
+    with TrendStore.open(tmp_path / "trends.db") as store:
+        store.add(entry("a"))
+        copying = sqlite3.connect(tmp_path / "trends.db")
+        copying.execute("VACUUM INTO ?", (str(tmp_path / "copy.db"),))
+        copying.close()
+        there = store.entries(curves=True)
+    with TrendStore.open(tmp_path / "copy.db") as copy:
+        assert repr(copy.entries(curves=True)) == repr(there)
+        assert copy.add(entry("a"))[0].revision == 2
+    with raw(tmp_path / "copy.db") as c:
+        assert c.scalar(text("PRAGMA journal_mode")) == "wal"
+        with pytest.raises(DBAPIError, match="only grows"):
+            c.execute(text("DELETE FROM entry"))
 
 
 # ---- its schema

@@ -179,13 +179,13 @@ class TrendStore:
             switch_to_wal(self._writing)
         with _MIGRATING, self._writing.begin() as connection:
             self._lock(connection)
-            if self._version(connection) != HEAD:  # nobody was faster
-                config.attributes.update(connection=connection, version_table=VERSION_TABLE)
-                command.upgrade(config, "head")
+            config.attributes.update(connection=connection, version_table=VERSION_TABLE)
+            command.upgrade(config, "head")  # which does nothing where somebody was faster
 
     def _check_writable(self) -> None:
-        if self._url.drivername == "sqlite":
-            return  # reach() has looked
+        if self._url.drivername == "sqlite":  # reach() has looked; a copy by VACUUM INTO has lost its WAL mode
+            switch_to_wal(self._writing)
+            return
         with self._writing.connect() as connection:
             may = connection.scalar(select(func.has_table_privilege("entry", "INSERT")))
             if not may or connection.scalar(text("SHOW transaction_read_only")) == "on":
