@@ -103,7 +103,7 @@ def killed(process: subprocess.Popen) -> list[str]:
 def wait_for_writers(store) -> None:
     """A server may still be finishing the commit of a process that is gone."""
     with store._writing.begin() as connection:
-        store._lock(connection)
+        place.wait_for_turn(connection)
 
 
 def is_whole(e: Entry) -> bool:
@@ -145,14 +145,14 @@ def test_law_numbers_that_are_not_finite_are_kept_as_none(url):
     nan, inf = float("nan"), float("inf")
     odd = Entry(
         "c", "e", "deploy", "2005-01-01T00:00:00", values=(Value("a", "fused", nan, inf, "s"),),
-        provenance={"a": nan, "b": [np.float64(inf), np.int64(3), np.arange(2)], "path": Path("x/y")},
+        provenance={"a": nan, "b": [np.float64(inf), np.int64(3), np.arange(2)], "path": Path("x/y"), "NUL": "\0"},
     )  # fmt: skip
     with TrendStore.open(url) as store:
         (added,) = store.add([odd])
         (kept,) = store.entries()
     assert kept == added
     assert kept.values == (Value("a", "fused", None, None, "s"),)
-    assert kept.provenance == {"a": None, "b": [None, 3, [0, 1]], "path": str(Path("x/y"))}
+    assert kept.provenance == {"a": None, "b": [None, 3, [0, 1]], "path": str(Path("x/y")), "NUL": "\0"}
 
 
 def test_law_an_event_analysed_again_is_a_further_revision(url):
@@ -320,6 +320,17 @@ def test_law_four_writers_of_one_event_lose_nothing(url):
     assert [e.revision for e in kept] == list(range(1, 101)) and all(is_whole(e) for e in kept)
     by_revision = {e.revision: e.note for e in kept}
     assert all(by_revision[r] == str(n) for n, s in enumerate(said) for r in s)
+
+
+def test_law_a_writer_that_never_ends_is_not_waited_for_forever(url, monkeypatch):
+    monkeypatch.setattr(place, "BUSY_S", 0.2)
+    with TrendStore.open(url) as first, TrendStore.open(url) as second:
+        with first._writing.begin() as connection:
+            place.wait_for_turn(connection)
+            with pytest.raises(BadInput, match=r"lock[\s\S]*Another program holds it"):
+                second.add(entry("a"))
+            assert second.entries() == []
+        assert second.add(entry("a"))[0].revision == 1
 
 
 def test_law_two_that_open_a_new_store_at_once_both_get_it(fresh):

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from sqlalchemy import Engine, create_engine, event
+from sqlalchemy import Connection, Engine, create_engine, event, func, select, text
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError
 from sqlalchemy.pool import QueuePool
@@ -21,12 +21,15 @@ from ..kit.files import check_place
 BUSY_S = 60.0
 #: How long to wait for a server to answer. [s]
 CONNECT_S = 10
+#: PostgreSQL's advisory lock of everyone who adds or migrates.
+_LOCK = int.from_bytes(b"asflown", "big")
 _FORMS = "Name a file, sqlite:///FILE or postgresql://USER@HOST/DATABASE."
 _POSTGRESQL = ("postgresql", "postgres", "postgresql+psycopg")
 #: What SQLite and PostgreSQL say -> what to do.
 _REMEDIES = {
     "not a database": "Name another file, or a new one: this is not SQLite.",
     "malformed": "The file is damaged: restore it from a backup.",
+    "lock timeout": "Another program holds it: let that finish, then try again.",
     "locked": "Another program holds it: let that finish, then try again.",
     "is full": "Make room on the disk, then try again: nothing of this entry was kept.",
     "readonly": "Copy the store to a place you may write to.",
@@ -38,14 +41,14 @@ _REMEDIES = {
 
 def url_of(place: str | Path) -> URL:
     """A bare path means SQLite.  Raises BadInput, which never repeats what may hold a password."""
-    text = str(place)
-    if not text or text == ":memory:":
+    name = str(place)
+    if not name or name == ":memory:":
         raise BadInput("the trend store has no place", remedy=_FORMS)
-    if "://" not in text:
-        return URL.create("sqlite", database=text)
-    scheme = text.split("://")[0]
+    if "://" not in name:
+        return URL.create("sqlite", database=name)
+    scheme = name.split("://")[0]
     try:
-        url = make_url(text)
+        url = make_url(name)
     except (ArgumentError, ValueError):
         raise BadInput(f"a URL that cannot be read ({scheme}://…)", remedy=_FORMS) from None
     if scheme in _POSTGRESQL:
@@ -102,6 +105,13 @@ def switch_to_wal(engine: Engine) -> None:
                 time.sleep(0.02)
     finally:
         raw.close()
+
+
+def wait_for_turn(connection: Connection) -> None:
+    """Alone among writers until the transaction ends; in SQLite BEGIN IMMEDIATE has seen to it."""
+    if connection.dialect.name == "postgresql":
+        connection.execute(text(f"SET LOCAL lock_timeout = '{BUSY_S:g}s'"))
+        connection.execute(select(func.pg_advisory_xact_lock(_LOCK)))
 
 
 def _sqlite(url: URL, create: bool) -> tuple[Engine, Engine]:

@@ -20,11 +20,9 @@ from sqlalchemy.engine import URL
 from ..kit.errors import BadInput, some_of
 from ..kit.plain import plain
 from .entry import Curve, Entry, Value
-from .place import label, plainly, reach, switch_to_wal, url_of
+from .place import label, plainly, reach, switch_to_wal, url_of, wait_for_turn
 from .schema import CURVE, ENTRY, HEAD, VALUE, VERSION_TABLE
 
-#: PostgreSQL's advisory lock of everyone who adds or migrates.
-_LOCK = int.from_bytes(b"asflown", "big")
 #: alembic keeps its context in module globals.
 _MIGRATING = threading.Lock()
 _ALEMBIC = "asflown.trends:migrations"
@@ -126,13 +124,13 @@ class TrendStore:
 
     def _add(self, entry: Entry) -> Entry:
         with self._writing.begin() as connection:
-            self._lock(connection)
+            wait_for_turn(connection)
             same = (ENTRY.c.craft == entry.craft) & (ENTRY.c.event == entry.event)
             last = connection.scalar(select(func.max(ENTRY.c.revision)).where(same))
             added = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%S")
             entry = replace(entry, revision=(last or 0) + 1, added=added)
             row = {c.name: getattr(entry, c.name) for c in ENTRY.c if c.name != "id"}
-            key = connection.scalars(insert(ENTRY).values(row).returning(ENTRY.c.id)).one()
+            (key,) = connection.execute(insert(ENTRY).values(row)).inserted_primary_key or ()
             if entry.values:
                 rows = [{"entry_id": key, "place": i, **vars(v)} for i, v in enumerate(entry.values)]
                 connection.execute(insert(VALUE), rows)
@@ -140,11 +138,6 @@ class TrendStore:
                 of_curve = {"entry_id": key, "place": i, "name": c.name, "unit": c.unit, "data": _packed(c)}
                 connection.execute(insert(CURVE).values(of_curve))
         return entry
-
-    def _lock(self, connection: Connection) -> None:
-        """Alone among writers until the transaction ends; in SQLite BEGIN IMMEDIATE has seen to it."""
-        if connection.dialect.name == "postgresql":
-            connection.execute(select(func.pg_advisory_xact_lock(_LOCK)))
 
     def _version(self, connection: Connection) -> str | None:
         """The schema's version; None where the database is empty."""
@@ -178,7 +171,7 @@ class TrendStore:
         if version is None and self._url.drivername == "sqlite":
             switch_to_wal(self._writing)
         with _MIGRATING, self._writing.begin() as connection:
-            self._lock(connection)
+            wait_for_turn(connection)
             config.attributes.update(connection=connection, version_table=VERSION_TABLE)
             command.upgrade(config, "head")  # which does nothing where somebody was faster
 
