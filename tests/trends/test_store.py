@@ -96,7 +96,8 @@ def writer(*arguments) -> subprocess.Popen:
 def killed(process: subprocess.Popen) -> list[str]:
     """Killed as by a power cut; what it had said and nobody read yet."""
     process.kill()
-    said = process.communicate()[0]
+    with process:  # not communicate(), which overlooks what readline() has fetched already
+        said = process.stdout.read()
     return said[: said.rfind("\n") + 1].split()  # a word cut short was not said
 
 
