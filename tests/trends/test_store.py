@@ -238,6 +238,7 @@ def test_law_a_list_with_one_impossible_entry_keeps_none(url):
         "NUL": replace(a, note="a\0b"),
         "half a character": replace(a, doubts=("\ud800",)),
         "without craft or event": replace(a, event=""),
+        "the date '2005-001'": replace(a, date="2005-001"),
     }
     with TrendStore.open(url) as store:
         for why, bad in impossible.items():
@@ -505,14 +506,20 @@ def test_law_postgresql_needs_no_more_than_the_right_to_read_or_to_insert(server
         ("postgresql://me:geheim@127.0.0.1:1/db", "(?s)127.0.0.1.*Check the server"),
         ("postgresql://me@127.0.0.1:1/db?password=geheim", "(?s)127.0.0.1.*Check the server"),
         ("postgresql://me:geheim@127.0.0.1/db?geheim=1", "invalid connection option"),
+        ("postgresql://me:geheim@127.0.0.1/db?plugin=no", "Can't load plugin"),
+        ("postgresql://me:geheim@/db?host=a,b&port=1,2,3", "hosts and ports"),
+        ("postgresql://me:ge@heim@127.0.0.1/db", "(?s)cannot be read.*%40"),
+        ("postgresql:/me:geheim@host/db", "lacks its //"),
+        (Path("postgresql+psycopg://me:geheim@host/db"), "lacks its //"),
         ("/proc/asflown/trends.db", "cannot be written"),
+        (f"/tmp/{300 * 'x'}.db", "unable to open"),
     ],
 )
 def test_bad_place_is_one_clear_error_without_the_password(url, why):
     with pytest.raises(BadInput, match=why) as error:
         TrendStore.open(url)
     assert error.value.remedy and error.value.__cause__ is None
-    assert "geheim" not in str(error.value).replace('option "geheim"', "")
+    assert "heim" not in str(error.value).replace('option "geheim"', "")
 
 
 def test_bad_files_are_one_clear_error_and_left_as_they_are(tmp_path):
@@ -535,6 +542,8 @@ def test_bad_files_are_one_clear_error_and_left_as_they_are(tmp_path):
         TrendStore.open(tmp_path)
     with pytest.raises(BadInput, match="no trend store is there"):
         TrendStore.open(tmp_path, create=False)
+    with pytest.raises(BadInput, match="no trend store is there"):
+        TrendStore.open(tmp_path / (300 * "x"), create=False)
     assert not list(tmp_path.glob("*-wal"))
 
 
@@ -566,3 +575,12 @@ def test_law_odd_names_of_files_are_only_names(tmp_path):
         assert (tmp_path / name).is_file()
         with TrendStore.open(f"sqlite:///{tmp_path}/plain.db") as store:
             assert str(store) == f"{tmp_path}/plain.db"
+
+
+def test_law_a_link_to_a_store_is_that_store(tmp_path):
+    (tmp_path / "here").mkdir()
+    link = tmp_path / "here" / "link.db"
+    link.symlink_to(tmp_path / "trends.db")
+    with TrendStore.open(link) as one, TrendStore.open(tmp_path / "trends.db") as other:
+        assert [s.add(entry("a"))[0].revision for s in (one, other, one)] == [1, 2, 3]
+    assert [p.name for p in link.parent.iterdir()] == ["link.db"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 import threading
 import zipfile
 import zlib
@@ -26,6 +27,7 @@ from .schema import CURVE, ENTRY, HEAD, VALUE, VERSION_TABLE
 #: alembic keeps its context in module globals.
 _MIGRATING = threading.Lock()
 _ALEMBIC = "asflown.trends:migrations"
+_DATE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d")
 
 
 class TrendStore:
@@ -41,7 +43,8 @@ class TrendStore:
         ``create`` False: for reading; a store must be there, and nothing is written where its schema is current.
         Raises BadInput where there is no store, it cannot be reached or used, or (``create``) not be written."""
         place = url_of(url)
-        store = cls(place, *reach(place, create=create))
+        with plainly(place):
+            store = cls(place, *reach(place, create=create))
         try:
             with plainly(place):
                 with store._reading.connect() as connection:
@@ -227,6 +230,8 @@ def _ready(entry: Entry) -> Entry:
         raise BadInput(f"{where} has text that no database keeps (NUL or half a character)", remedy="Take it out.")
     if not (entry.craft and entry.event):
         raise BadInput("an entry without craft or event", remedy="Name both.")
+    if not _DATE.fullmatch(entry.date):  # entries are put in order by it
+        raise BadInput(f"{where} has the date {entry.date!r}", remedy="Give it in UTC, as 2015-09-29T00:00:00.")
     values = tuple(replace(v, value=_finite(v.value), sigma=_finite(v.sigma)) for v in entry.values)
     return replace(entry, values=values, doubts=tuple(entry.doubts), provenance=plain(entry.provenance))
 
