@@ -522,6 +522,15 @@ def test_bad_place_is_one_clear_error_without_the_password(url, why):
     assert "heim" not in str(error.value).replace('option "geheim"', "")
 
 
+@pytest.mark.parametrize("password", ["me:geheim@host/db", "me:ge/heim@host/db", "me@host/db?password=geheim"])
+def test_law_a_report_names_a_store_without_its_password(password):
+    from asflown.cli.trend import without_password
+
+    named = without_password(f"postgresql://{password}")
+    assert named.startswith("postgresql://me") and named.endswith("@host/db") and "heim" not in named
+    assert without_password("trends.db") == without_password("sqlite:///trends.db") == "trends.db"
+
+
 def test_bad_files_are_one_clear_error_and_left_as_they_are(tmp_path):
     with TrendStore.open(tmp_path / "good.db") as store:
         store.add([entry("a")] * 3)
