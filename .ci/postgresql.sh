@@ -4,18 +4,17 @@
 postgresql_programs() {  # the folder of initdb and pg_ctl
   local found
   found=$(command -v initdb || ls -d /usr/lib/postgresql/*/bin/initdb 2>/dev/null | sort -V | tail -n 1 || true)
-  [ -n "$found" ] && dirname "$found"
+  [ -n "$found" ] && dirname "$(readlink -f "$found")"
 }
 
 install_postgresql() {
-  local root=()
+  local root=() apt
   [ "$(id -u)" = 0 ] || root=(sudo -n)
-  command -v apt-get >/dev/null || return 1
-  # Only the programs: no cluster of the system's own.
-  "${root[@]}" mkdir -p /etc/postgresql-common || return 1
-  [ -e /etc/postgresql-common/createcluster.conf ] ||
-    echo "create_main_cluster = false" | "${root[@]}" tee /etc/postgresql-common/createcluster.conf >/dev/null || return 1
-  "${root[@]}" apt-get update -qq && "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq postgresql
+  apt=("${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq)
+  command -v apt-get >/dev/null && "${apt[@]}" update && "${apt[@]}" install -y postgresql-common || return 1
+  # Only the programs: no server of the system's own.
+  "${root[@]}" sed -ri 's/^#?create_main_cluster .*/create_main_cluster = false/' /etc/postgresql-common/createcluster.conf || true
+  "${apt[@]}" install -y postgresql
 }
 
 as_postgresql_user() {  # initdb and the server refuse to run as root
@@ -41,8 +40,7 @@ start_postgresql() {
     as_postgresql_user "$POSTGRESQL_BIN/initdb" -D "$POSTGRESQL_HOME/data" -U asflown -A trust -E UTF8 --locale=C &&
       as_postgresql_user "$POSTGRESQL_BIN/pg_ctl" -D "$POSTGRESQL_HOME/data" -l "$POSTGRESQL_HOME/log" -w -t 60 \
         -o "-c listen_addresses='' -c unix_socket_directories='$POSTGRESQL_HOME'" start
-  ) >"$POSTGRESQL_HOME.out" 2>&1 || { cat "$POSTGRESQL_HOME.out" "$POSTGRESQL_HOME/log" >&2; rm -f "$POSTGRESQL_HOME.out"; return 1; }
-  rm -f "$POSTGRESQL_HOME.out"
+  ) >"$POSTGRESQL_HOME/start" 2>&1 || { cat "$POSTGRESQL_HOME/start" "$POSTGRESQL_HOME/log" >&2; return 1; }
   export ASFLOWN_TEST_POSTGRESQL="postgresql://asflown@/postgres?host=$POSTGRESQL_HOME"
 }
 

@@ -112,6 +112,16 @@ def test_simulator_page_gives_the_noise_table():
         assert [float(r[column]) for r in rows] == pytest.approx(values)
 
 
+def test_store_page_lists_every_table_and_column():
+    from asflown.trends.schema import METADATA
+
+    rows = [x.split(" | ") for x in section(page("store.md"), "What is kept").splitlines() if x.startswith("| `")]
+    listed = {name.strip("| `"): set(re.findall(r"`(\w+)`", columns)) for name, _, columns in rows}
+    assert set(listed) == set(METADATA.tables)
+    for name, table in METADATA.tables.items():
+        assert {c.name for c in table.columns} - {"id", "entry_id", "place"} <= listed[name]
+
+
 def test_every_picture_and_page_linked_is_there_and_small():
     for file in DOCS.rglob("*.md"):
         for target in re.findall(r"\]\(([^)#:]+)\)", file.read_text(encoding="utf-8")):

@@ -8,6 +8,7 @@ import random
 import sqlite3
 import subprocess
 import sys
+import threading
 import time
 from contextlib import contextmanager
 from dataclasses import replace
@@ -95,14 +96,15 @@ def writer(*arguments) -> subprocess.Popen:
 def killed(process: subprocess.Popen) -> list[str]:
     """Killed as by a power cut; what it had said and nobody read yet."""
     process.kill()
-    said = process.communicate()[0]
+    with process:  # not communicate(), which overlooks what readline() has fetched already
+        said = process.stdout.read()
     return said[: said.rfind("\n") + 1].split()  # a word cut short was not said
 
 
 def wait_for_writers(store) -> None:
     """A server may still be finishing the commit of a process that is gone."""
     with store._writing.begin() as connection:
-        store._lock(connection)
+        place.wait_for_turn(connection)
 
 
 def is_whole(e: Entry) -> bool:
@@ -144,14 +146,14 @@ def test_law_numbers_that_are_not_finite_are_kept_as_none(url):
     nan, inf = float("nan"), float("inf")
     odd = Entry(
         "c", "e", "deploy", "2005-01-01T00:00:00", values=(Value("a", "fused", nan, inf, "s"),),
-        provenance={"a": nan, "b": [np.float64(inf), np.int64(3), np.arange(2)], "path": Path("x/y")},
+        provenance={"a": nan, "b": [np.float64(inf), np.int64(3), np.arange(2)], "path": Path("x/y"), "NUL": "\0"},
     )  # fmt: skip
     with TrendStore.open(url) as store:
         (added,) = store.add([odd])
         (kept,) = store.entries()
     assert kept == added
     assert kept.values == (Value("a", "fused", None, None, "s"),)
-    assert kept.provenance == {"a": None, "b": [None, 3, [0, 1]], "path": str(Path("x/y"))}
+    assert kept.provenance == {"a": None, "b": [None, 3, [0, 1]], "path": str(Path("x/y")), "NUL": "\0"}
 
 
 def test_law_an_event_analysed_again_is_a_further_revision(url):
@@ -236,6 +238,7 @@ def test_law_a_list_with_one_impossible_entry_keeps_none(url):
         "NUL": replace(a, note="a\0b"),
         "half a character": replace(a, doubts=("\ud800",)),
         "without craft or event": replace(a, event=""),
+        "the date '2005-001'": replace(a, date="2005-001"),
     }
     with TrendStore.open(url) as store:
         for why, bad in impossible.items():
@@ -321,6 +324,17 @@ def test_law_four_writers_of_one_event_lose_nothing(url):
     assert all(by_revision[r] == str(n) for n, s in enumerate(said) for r in s)
 
 
+def test_law_a_writer_that_never_ends_is_not_waited_for_forever(url, monkeypatch):
+    monkeypatch.setattr(place, "BUSY_S", 0.2)
+    with TrendStore.open(url) as first, TrendStore.open(url) as second:
+        with first._writing.begin() as connection:
+            place.wait_for_turn(connection)
+            with pytest.raises(BadInput, match=r"lock[\s\S]*Another program holds it"):
+                second.add(entry("a"))
+            assert second.entries() == []
+        assert second.add(entry("a"))[0].revision == 1
+
+
 def test_law_two_that_open_a_new_store_at_once_both_get_it(fresh):
     writers = [writer("open"), writer("open")]
     try:
@@ -334,6 +348,42 @@ def test_law_two_that_open_a_new_store_at_once_both_get_it(fresh):
     finally:
         for p in writers:
             killed(p)
+
+
+def test_law_a_new_store_waits_for_whoever_holds_its_file(tmp_path):
+    path = tmp_path / "trends.db"
+    other = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
+    other.execute("BEGIN IMMEDIATE")
+    letting_go = threading.Timer(0.3, other.rollback)
+    letting_go.start()
+    with TrendStore.open(path) as store:
+        assert store.add(entry("a"))[0].revision == 1
+    letting_go.join()
+    other.close()
+
+
+def test_law_sqlite_has_a_commit_on_the_disk_before_it_says_so(tmp_path):
+    TrendStore.open(tmp_path / "trends.db").close()
+    with raw(tmp_path / "trends.db") as c:
+        assert c.scalar(text("PRAGMA journal_mode")) == "wal"
+        assert c.scalar(text("PRAGMA synchronous")) == 2  # FULL
+        assert c.scalar(text("PRAGMA foreign_keys")) == 1
+
+
+def test_law_a_copy_made_while_the_store_is_open_is_a_store(tmp_path):
+    with TrendStore.open(tmp_path / "trends.db") as store:
+        store.add(entry("a"))
+        copying = sqlite3.connect(tmp_path / "trends.db")
+        copying.execute("VACUUM INTO ?", (str(tmp_path / "copy.db"),))
+        copying.close()
+        there = store.entries(curves=True)
+    with TrendStore.open(tmp_path / "copy.db") as copy:
+        assert repr(copy.entries(curves=True)) == repr(there)
+        assert copy.add(entry("a"))[0].revision == 2
+    with raw(tmp_path / "copy.db") as c:
+        assert c.scalar(text("PRAGMA journal_mode")) == "wal"
+        with pytest.raises(DBAPIError, match="only grows"):
+            c.execute(text("DELETE FROM entry"))
 
 
 # ---- its schema
@@ -456,14 +506,29 @@ def test_law_postgresql_needs_no_more_than_the_right_to_read_or_to_insert(server
         ("postgresql://me:geheim@127.0.0.1:1/db", "(?s)127.0.0.1.*Check the server"),
         ("postgresql://me@127.0.0.1:1/db?password=geheim", "(?s)127.0.0.1.*Check the server"),
         ("postgresql://me:geheim@127.0.0.1/db?geheim=1", "invalid connection option"),
+        ("postgresql://me:geheim@127.0.0.1/db?plugin=no", "Can't load plugin"),
+        ("postgresql://me:geheim@/db?host=a,b&port=1,2,3", "hosts and ports"),
+        ("postgresql://me:ge@heim@127.0.0.1/db", "(?s)cannot be read.*%40"),
+        ("postgresql:/me:geheim@host/db", "lacks its //"),
+        (Path("postgresql+psycopg://me:geheim@host/db"), "lacks its //"),
         ("/proc/asflown/trends.db", "cannot be written"),
+        (f"/tmp/{300 * 'x'}.db", "unable to open"),
     ],
 )
 def test_bad_place_is_one_clear_error_without_the_password(url, why):
     with pytest.raises(BadInput, match=why) as error:
         TrendStore.open(url)
     assert error.value.remedy and error.value.__cause__ is None
-    assert "geheim" not in str(error.value).replace('option "geheim"', "")
+    assert "heim" not in str(error.value).replace('option "geheim"', "")
+
+
+@pytest.mark.parametrize("password", ["me:geheim@host/db", "me:ge/heim@host/db", "me@host/db?password=geheim"])
+def test_law_a_report_names_a_store_without_its_password(password):
+    from asflown.cli.trend import without_password
+
+    named = without_password(f"postgresql://{password}")
+    assert named.startswith("postgresql://me") and named.endswith("@host/db") and "heim" not in named
+    assert without_password("trends.db") == without_password("sqlite:///trends.db") == "trends.db"
 
 
 def test_bad_files_are_one_clear_error_and_left_as_they_are(tmp_path):
@@ -486,6 +551,8 @@ def test_bad_files_are_one_clear_error_and_left_as_they_are(tmp_path):
         TrendStore.open(tmp_path)
     with pytest.raises(BadInput, match="no trend store is there"):
         TrendStore.open(tmp_path, create=False)
+    with pytest.raises(BadInput, match="no trend store is there"):
+        TrendStore.open(tmp_path / (300 * "x"), create=False)
     assert not list(tmp_path.glob("*-wal"))
 
 
@@ -517,3 +584,12 @@ def test_law_odd_names_of_files_are_only_names(tmp_path):
         assert (tmp_path / name).is_file()
         with TrendStore.open(f"sqlite:///{tmp_path}/plain.db") as store:
             assert str(store) == f"{tmp_path}/plain.db"
+
+
+def test_law_a_link_to_a_store_is_that_store(tmp_path):
+    (tmp_path / "here").mkdir()
+    link = tmp_path / "here" / "link.db"
+    link.symlink_to(tmp_path / "trends.db")
+    with TrendStore.open(link) as one, TrendStore.open(tmp_path / "trends.db") as other:
+        assert [s.add(entry("a"))[0].revision for s in (one, other, one)] == [1, 2, 3]
+    assert [p.name for p in link.parent.iterdir()] == ["link.db"]

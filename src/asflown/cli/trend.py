@@ -450,6 +450,6 @@ def _doubts_by_event(entries) -> dict[str, str]:
 
 
 def without_password(store: str) -> str:
-    import re
+    from asflown.trends.place import label, url_of
 
-    return re.sub(r"(://[^:/@]*):[^@/]*@", r"\1:***@", store)
+    return label(url_of(store))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 import threading
 import zipfile
 import zlib
@@ -20,14 +21,13 @@ from sqlalchemy.engine import URL
 from ..kit.errors import BadInput, some_of
 from ..kit.plain import plain
 from .entry import Curve, Entry, Value
-from .place import label, plainly, reach, switch_to_wal, url_of
+from .place import label, plainly, reach, switch_to_wal, url_of, wait_for_turn
 from .schema import CURVE, ENTRY, HEAD, VALUE, VERSION_TABLE
 
-#: PostgreSQL's advisory lock of everyone who adds or migrates.
-_LOCK = int.from_bytes(b"asflown", "big")
 #: alembic keeps its context in module globals.
 _MIGRATING = threading.Lock()
 _ALEMBIC = "asflown.trends:migrations"
+_DATE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d")
 
 
 class TrendStore:
@@ -43,7 +43,8 @@ class TrendStore:
         ``create`` False: for reading; a store must be there, and nothing is written where its schema is current.
         Raises BadInput where there is no store, it cannot be reached or used, or (``create``) not be written."""
         place = url_of(url)
-        store = cls(place, *reach(place, create=create))
+        with plainly(place):
+            store = cls(place, *reach(place, create=create))
         try:
             with plainly(place):
                 with store._reading.connect() as connection:
@@ -126,13 +127,13 @@ class TrendStore:
 
     def _add(self, entry: Entry) -> Entry:
         with self._writing.begin() as connection:
-            self._lock(connection)
+            wait_for_turn(connection)
             same = (ENTRY.c.craft == entry.craft) & (ENTRY.c.event == entry.event)
             last = connection.scalar(select(func.max(ENTRY.c.revision)).where(same))
             added = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%S")
             entry = replace(entry, revision=(last or 0) + 1, added=added)
             row = {c.name: getattr(entry, c.name) for c in ENTRY.c if c.name != "id"}
-            key = connection.scalars(insert(ENTRY).values(row).returning(ENTRY.c.id)).one()
+            (key,) = connection.execute(insert(ENTRY).values(row)).inserted_primary_key or ()
             if entry.values:
                 rows = [{"entry_id": key, "place": i, **vars(v)} for i, v in enumerate(entry.values)]
                 connection.execute(insert(VALUE), rows)
@@ -140,11 +141,6 @@ class TrendStore:
                 of_curve = {"entry_id": key, "place": i, "name": c.name, "unit": c.unit, "data": _packed(c)}
                 connection.execute(insert(CURVE).values(of_curve))
         return entry
-
-    def _lock(self, connection: Connection) -> None:
-        """Alone among writers until the transaction ends; in SQLite BEGIN IMMEDIATE has seen to it."""
-        if connection.dialect.name == "postgresql":
-            connection.execute(select(func.pg_advisory_xact_lock(_LOCK)))
 
     def _version(self, connection: Connection) -> str | None:
         """The schema's version; None where the database is empty."""
@@ -178,14 +174,14 @@ class TrendStore:
         if version is None and self._url.drivername == "sqlite":
             switch_to_wal(self._writing)
         with _MIGRATING, self._writing.begin() as connection:
-            self._lock(connection)
-            if self._version(connection) != HEAD:  # nobody was faster
-                config.attributes.update(connection=connection, version_table=VERSION_TABLE)
-                command.upgrade(config, "head")
+            wait_for_turn(connection)
+            config.attributes.update(connection=connection, version_table=VERSION_TABLE)
+            command.upgrade(config, "head")  # which does nothing where somebody was faster
 
     def _check_writable(self) -> None:
-        if self._url.drivername == "sqlite":
-            return  # reach() has looked
+        if self._url.drivername == "sqlite":  # reach() has looked; a copy by VACUUM INTO has lost its WAL mode
+            switch_to_wal(self._writing)
+            return
         with self._writing.connect() as connection:
             may = connection.scalar(select(func.has_table_privilege("entry", "INSERT")))
             if not may or connection.scalar(text("SHOW transaction_read_only")) == "on":
@@ -234,6 +230,8 @@ def _ready(entry: Entry) -> Entry:
         raise BadInput(f"{where} has text that no database keeps (NUL or half a character)", remedy="Take it out.")
     if not (entry.craft and entry.event):
         raise BadInput("an entry without craft or event", remedy="Name both.")
+    if not _DATE.fullmatch(entry.date):  # entries are put in order by it
+        raise BadInput(f"{where} has the date {entry.date!r}", remedy="Give it in UTC, as 2015-09-29T00:00:00.")
     values = tuple(replace(v, value=_finite(v.value), sigma=_finite(v.sigma)) for v in entry.values)
     return replace(entry, values=values, doubts=tuple(entry.doubts), provenance=plain(entry.provenance))
 
