@@ -102,7 +102,8 @@ def _shape_of(cover: CoverMotion, part: MovingPart) -> _Shape:
             remedy="Take cover-deploy or cover-stow as the pattern.",
         )
     stall = (cover.stall - times[turn[-2]]) / (times[turn[-1]] - times[turn[-2]])
-    return _Shape(PchipInterpolator(times, held), float(times[0]), end, times[turn], steps, float(np.clip(stall, 0, 1)))
+    from_rest = PchipInterpolator([times[0] - 1, *times], [0, *held])  # its slope is zero at the start
+    return _Shape(from_rest, float(times[0]), end, times[turn], steps, float(np.clip(stall, 0, 1)))
 
 
 def aged(cover: CoverMotion, now, wanted: Figures, late_s=None) -> tuple[CoverMotion, Figures]:
