@@ -269,7 +269,7 @@ def test_law_kill_loses_nothing_that_was_acknowledged(url):
         assert len(kept) in (acknowledged, acknowledged + 1)
         assert all(is_whole(e) for e in kept)
         assert sum(e.note == str(n) for e in kept) in (len(said), len(said) + 1)
-    assert acknowledged > 16
+    assert acknowledged >= 8
     with raw(url) as c:
         for table, per_entry in (("value", VALUES), ("curve", CURVES)):
             assert c.scalar(text(f"SELECT count(*) FROM {table}")) == per_entry * len(kept)
