@@ -85,6 +85,12 @@ def analyse(event: Event, craft: Craft, telemetry: Telemetry | None = None) -> E
     )  # fmt: skip
 
 
+def torque_about_hinge(tlm: Telemetry, craft: Craft, event: Event, basis: str = "fused") -> Torque:
+    """The torque that the event's figures are taken from."""
+    mechanism = _mechanism(craft, event, tlm)
+    return _about_hinge(_torque(tlm, craft, mechanism, *BASES[basis]), mechanism, event)
+
+
 def _mechanism(craft: Craft, event: Event, tlm: Telemetry) -> Mechanism:
     names = [m.name for m in craft.mechanisms]
     if not names:
