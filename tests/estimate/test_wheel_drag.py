@@ -37,7 +37,7 @@ def telemetry(channels: dict, dated: bool = True) -> Telemetry:
 
 def course(t, first: float, coulomb: float, viscous: float, start: float, stop: float) -> np.ndarray:
     """A wheel held at a rate, let go, and held again, by small steps of Heun's rule: not the law's closed form."""
-    step = 0.05
+    step = 0.5
     fine = np.arange(0.0, t[-1] + step, step)
     w = np.full(len(fine), first)
 
@@ -211,7 +211,7 @@ def test_a_motor_that_slows_a_wheel_is_not_a_bearing(shape):
 
 
 def test_a_narrow_run_down_gives_the_drag_together_where_it_is_named():
-    t, w = run_down(7, length=120, before=0.0)
+    t, w = run_down(7, length=100, before=0.0)
     tlm = telemetry({"wheel_rate_RWA1": (t, w)})
     assert wheel_drag(tlm, CASSINI).wheel("RWA1").fit is None
     result = wheel_drag(tlm, CASSINI, run_down=True)

@@ -241,20 +241,25 @@ class Finder:
         return bool(seen and x[1] > _CURVED * sigma_b and _SHARE[0] < share < _SHARE[1])
 
     def found(self) -> list[tuple[int, int]]:
-        """All stretches that obey the law, grown as far as they do, their ends trimmed."""
-        kept: list[tuple[int, int]] = []
+        """All stretches that obey the law, grown as far as they do; of two that overlap, the longer one."""
+        grown: list[tuple[int, int]] = []
         for stretch in self.stretches():
-            a, first = stretch.start, stretch.start
+            a = stretch.start
             while a + FEWEST <= stretch.stop:
                 if not self.obeys(a, a + FEWEST):
                     a += FEWEST // 2
                     continue
+                # the sample on either side of a switch may just fall within the noise: it is left out
                 b = _farthest(lambda b, a=a: self.obeys(a, b), a + FEWEST, stretch.stop)
-                start = -_farthest(lambda x, b=b: self.obeys(-x, b), -a, -first)
-                # the sample on either side of a switch may fall within the noise
-                kept.append((start + 1 if start > stretch.start else start, b - 1 if b < stretch.stop else b))
-                a = first = b
-        return [k for k in kept if k[1] - k[0] >= FEWEST]
+                end = b - 1 if b < stretch.stop else b
+                start = -_farthest(lambda x, end=end: self.obeys(-x, end), -a, -stretch.start)
+                grown.append((start + 1 if start > stretch.start else start, end))
+                a = b
+        kept: list[tuple[int, int]] = []
+        for a, b in sorted(grown, key=lambda k: k[0] - k[1]):
+            if b - a >= FEWEST and all(b <= c or a >= d for c, d in kept):
+                kept.append((a, b))
+        return sorted(kept)
 
 
 def _farthest(good, start: int, limit: int) -> int:

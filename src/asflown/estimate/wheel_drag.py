@@ -115,6 +115,8 @@ class _Study:
             by_reason.pop(_AS_IT_TURNS, None)  # every wheel of a turning craft does that: nobody needs to hear of it
             for why_not, stretches in by_reason.items():
                 a, b = max(stretches, key=lambda k: k[1] - k[0])
+                if b - a < 2 * FEWEST:  # so short, a wheel in the loop does it by chance
+                    continue
                 more = f", and in {len(stretches) - 1} more stretches" if len(stretches) > 1 else ""
                 self.doubts.append(
                     f"wheel {name} slows evenly from {finder.t[a]:.0f} to {finder.t[b - 1]:.0f} s{more}, but {why_not}: not "

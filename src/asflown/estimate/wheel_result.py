@@ -12,7 +12,7 @@ from .wheel_use import WheelUse
 RUN_DOWN, FLIGHT_SOFTWARE, COMMAND = "run-down", "flight software estimate", "command"
 
 #: The split of drag into both parts is doubted where it is uncertain by this share of the drag.
-_SPLIT = 0.3
+_SPLIT = 0.1
 _RPM = 60 / (2 * np.pi)
 
 
