@@ -17,7 +17,9 @@ from asflown.sim.fly import fly
 from asflown.telemetry.channels import kind_of
 from asflown.telemetry.load import load_telemetry
 from asflown.telemetry.telemetry import Channel, Telemetry
+from asflown.telemetry.tables import write_table
 from asflown.trends.wheel_entry import wheel_entry
+from cli.program import complaint, run
 from conftest import ROOT, flight_data
 
 CASSINI = load_craft("cassini")
@@ -194,7 +196,7 @@ def test_in_the_loop_drag_is_not_known_and_the_result_says_so(scenario, changes)
     for w in result.record()["wheels"]:
         assert w["basis"] is None and w["run_downs"] == [] and w["spikes"] is None
         assert all(w[k] is None for k in ("coulomb_Nm", "viscous_Nms", "drag_at_mean_Nm", "correlation"))
-    assert sum("its drag is not known" in d for d in result.doubts) == 3
+    assert sum("drag is not known of wheel RWA1, RWA2, RWA4" in d for d in result.doubts) == 1
 
 
 @pytest.mark.parametrize("shape", ["ramp", "let out", "braked"])
@@ -214,7 +216,7 @@ def test_a_narrow_run_down_gives_the_drag_together_where_it_is_named():
     t, w = run_down(7, length=100, before=0.0)
     tlm = telemetry({"wheel_rate_RWA1": (t, w)})
     assert wheel_drag(tlm, CASSINI).wheel("RWA1").fit is None
-    result = wheel_drag(tlm, CASSINI, run_down=True)
+    result = wheel_drag(tlm, CASSINI, run_down=("RWA1",))
     f = result.wheel("RWA1").fit
     assert not f.told_apart and any("too narrow" in d for d in result.doubts)
     assert abs(f.at_mean - 0.002 - 3.5e-5 * f.mean_rate) < 4 * f.sigma_at_mean and f.sigma_at_mean < 0.01 * f.at_mean
@@ -317,8 +319,10 @@ def test_bad_input():
         wheel_drag(telemetry({"wheel_rate_W9": (t, t)}), CASSINI)
     with pytest.raises(BadInput, match="not positive"):
         wheel_drag(telemetry({"wheel_rate_RWA1": (t, t)}), CASSINI, low_speed=0.0)
-    with pytest.raises(BadInput, match="no wheel slows down"):
-        wheel_drag(telemetry({"wheel_rate_RWA1": (t, 10 + t)}), CASSINI, run_down=True)
+    with pytest.raises(BadInput, match="no rate of wheel 'RWA2'"):
+        wheel_drag(telemetry({"wheel_rate_RWA1": (t, t)}), CASSINI, run_down=("RWA2",))
+    with pytest.raises(BadInput, match="does not slow down"):
+        wheel_drag(telemetry({"wheel_rate_RWA1": (t, 10 + t)}), CASSINI, run_down=("RWA1",))
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 5])
@@ -350,6 +354,42 @@ def test_entry_for_the_store():
     assert entry.value("drag_spikes_RWA1", "telemetry").value is None
     with pytest.raises(BadInput, match="no epoch"):
         wheel_entry(result, replace(flight.telemetry, dated=False), flight.craft, "x", {})
+
+
+KEYS = {"name", "coulomb_Nm", "sigma_coulomb_Nm", "viscous_Nms", "sigma_viscous_Nms", "correlation", "drag_at_mean_Nm",
+        "sigma_drag_at_mean_Nm", "mean_rate_rad_s", "basis", "run_downs", "spikes", "low_speed_dwell_s", "zero_crossings",
+        "revolutions", "largest_rate_rad_s"}  # fmt: skip
+
+
+def test_the_verb(tmp_path):
+    flight, result = flown(seed=1)
+    path = tmp_path / "t.csv"
+    write_table(flight.telemetry, path)
+    done = run("wheels", path, "--json", "--plot", tmp_path / "w.svg")
+    assert done.code == 0 and done.err == f"wrote {tmp_path / 'w.svg'}\n"
+    assert (tmp_path / "w.svg").read_text().startswith("<?xml")
+    record = done.record
+    assert (record["command"], record["craft"], record["epoch"]) == ("wheels", "cassini", "2015-09-29T00:00:00 UTC")
+    assert all(isinstance(d, str) for d in record["doubts"]) and len(record["provenance"]["inputs"][0]["sha256"]) == 64
+    assert [w["name"] for w in record["wheels"]] == list(flight.wheels)
+    for told, wheel in zip(record["wheels"], result.wheels, strict=True):
+        assert set(told) >= KEYS and told["basis"] == wheel.fit.basis
+        assert told["coulomb_Nm"] == pytest.approx(wheel.fit.coulomb, rel=1e-6)
+    assert set(record["wheels"][0]["run_downs"][0]) >= {"start_s", "stop_s", "from_rad_s", "to_rad_s"}
+    assert set(record["wheels"][2]["spikes"][0]) >= {"time_s", "drag_Nm", "duration_s"}
+    text = run("wheels", path, "--start", "200", "--stop", "300", "--run-down", "RWA1, RWA2", "--low-speed", "900 rpm")
+    assert text.code == 0 and text.out.count("run-down      200 to 300 s") == 2 and "100 s below 900 rpm" in text.out
+    assert "not told apart" in text.out and "DOUBT" in text.out
+
+
+def test_the_verb_refuses(tmp_path):
+    flight, _ = flown(seed=1)
+    path = tmp_path / "t.csv"
+    write_table(flight.telemetry, path)
+    for words in (["--low-speed", "300"], ["--low-speed", "300 s"], ["--low-speed", "-3 rpm"], ["--run-down", "RWA9"],
+                  ["--run-down", "RWA1", "--start", "2600"], ["--plot", tmp_path / "w.txt"], ["--craft", "iss"]):  # fmt: skip
+        complaint("wheels", path, *words)
+    assert not (tmp_path / "w.txt").exists()
 
 
 # ---- real recordings ---------------------------------------------------------------------------------------------

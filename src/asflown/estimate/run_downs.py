@@ -168,15 +168,14 @@ def slow_misfit(spans: list[Span], residuals: list[np.ndarray], sigma: float) ->
 
 
 def own_noise(values: np.ndarray, seconds: np.ndarray) -> float:
-    """White noise of one sample, from second differences over even steps (a median); 0 for too few. [rad/s]"""
+    """White noise of one sample, from how far each lies off the line between its neighbours; 0 for too few. [rad/s]
+
+    A median, so that kicks and corners do not count."""
     if len(values) < 3:
         return 0.0
-    steps = np.diff(seconds)
-    even = np.abs(steps - np.median(steps)) <= 0.5 * np.median(steps)
-    seconds_differences = (values[:-2] - 2 * values[1:-1] + values[2:])[even[:-1] & even[1:]]
-    if not len(seconds_differences):
-        return 0.0
-    return float(np.median(np.abs(seconds_differences))) / (0.67449 * 6**0.5)
+    share = (seconds[2:] - seconds[1:-1]) / (seconds[2:] - seconds[:-2])
+    off = values[1:-1] - share * values[:-2] - (1 - share) * values[2:]
+    return float(np.median(np.abs(off) / np.sqrt(1 + share**2 + (1 - share) ** 2))) / 0.67449
 
 
 class Finder:

@@ -7,6 +7,8 @@ makes up for whatever the drag is, so that the rates follow the torque on the bo
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from ..craft.model import Craft, Wheel
@@ -38,30 +40,45 @@ _NOT_QUITE = 2.0
 
 
 def wheel_drag(
-    telemetry: Telemetry, craft: Craft, *, low_speed: float = LOW_SPEED, run_down: bool = False
+    telemetry: Telemetry, craft: Craft, *, low_speed: float = LOW_SPEED, run_down: Collection[str] = ()
 ) -> WheelsResult:
     """Drag, spikes and use of each wheel that has a rate.
 
-    ``low_speed``: below it a wheel dwells [rad/s].  ``run_down``: the user says that the motors are off in all of this
-    telemetry; otherwise run-downs are those that only a bearing explains.
+    ``low_speed``: below it a wheel dwells [rad/s].  ``run_down``: wheels of which the user says that the motor is off in
+    all of this telemetry; otherwise run-downs are those that only a bearing explains.
 
-    Raises BadInput for telemetry without wheel rates, a wheel that the craft does not have, or, with ``run_down``,
-    where no wheel slows down."""
+    Raises BadInput for telemetry without wheel rates, a wheel that the craft does not have, or one in ``run_down``
+    that does not slow down."""
     if not low_speed > 0:
         raise BadInput(f"the low speed {low_speed:g} rad/s is not positive", remedy='Give it as in "300 rpm".')
     names = _wheels(telemetry, craft)
-    study = _Study(telemetry, craft, run_down)
+    for name in run_down:
+        if name not in names:
+            raise BadInput(
+                f"no rate of wheel {name!r}, whose run-down this is said to be",
+                file=telemetry.source or None,
+                remedy=f"Wheels with a rate here: {some_of(names)}.",
+            )
+    study = _Study(telemetry, craft, frozenset(run_down))
     finders = {n: study.finder(n) for n in names}
     coastings = {n: study.coasting(n, f) for n, f in finders.items()}
-    if run_down and not any(coastings.values()):
-        raise BadInput(
-            "no wheel slows down in this window",
-            file=telemetry.source or None,
-            remedy=f"A run-down takes {FEWEST} samples above {STICTION_RATE * 30 / np.pi:.0f} rpm without a gap. "
-            "Name its span with --start and --stop.",
-        )
+    for name in run_down:
+        if coastings[name] is None:
+            raise BadInput(
+                "the wheel does not slow down in this window",
+                file=telemetry.source or None,
+                channel=f"wheel_rate_{name}",
+                remedy=f"A run-down takes {FEWEST} samples above {STICTION_RATE * 30 / np.pi:.0f} rpm without a gap. "
+                "Name its span with --start and --stop.",
+            )
     study.coasts = [(r.start_s, r.stop_s) for c in coastings.values() if c for r in c.run_downs]
     wheels = tuple(study.wheel(n, finders[n], coastings[n], low_speed) for n in names)
+    unknown = [w.name for w in wheels if w.fit is None]
+    if unknown:
+        study.doubts.append(
+            f"drag is not known of wheel {some_of(unknown)}: no run-down is seen, and in the loop the motor makes up for drag, "
+            "so that the rate alone does not show it. It takes a run-down, wheel_drag_torque or control_torque"
+        )
     return WheelsResult(craft.name, telemetry.epoch_label, low_speed, wheels, tuple(dict.fromkeys(study.doubts)))
 
 
@@ -88,7 +105,7 @@ def _wheels(telemetry: Telemetry, craft: Craft) -> list[str]:
 class _Study:
     """One record: what all wheels need to know of each other, and the doubts as they come up."""
 
-    def __init__(self, telemetry: Telemetry, craft: Craft, named: bool):
+    def __init__(self, telemetry: Telemetry, craft: Craft, named: frozenset[str]):
         self.telemetry, self.craft, self.named = telemetry, craft, named
         self.now = craft.at(telemetry.epoch_ns if telemetry.dated else None)
         self.doubts = list(telemetry.doubts)
@@ -105,7 +122,7 @@ class _Study:
     # ---- run-downs ----------------------------------------------------------------------------------
 
     def coasting(self, name: str, finder: Finder) -> Coasting | None:
-        if self.named:
+        if name in self.named:
             spans = [(s.start, s.stop) for s in finder.stretches() if finder.falls(s.start, s.stop)]
         else:
             by_reason: dict[str, list[tuple[int, int]]] = {}
@@ -120,12 +137,12 @@ class _Study:
                 more = f", and in {len(stretches) - 1} more stretches" if len(stretches) > 1 else ""
                 self.doubts.append(
                     f"wheel {name} slows evenly from {finder.t[a]:.0f} to {finder.t[b - 1]:.0f} s{more}, but {why_not}: not "
-                    "taken as a run-down (--run-down with --start and --stop says that the motor was off)"
+                    f"taken as a run-down (--run-down {name} with --start and --stop says that the motor was off)"
                 )
         if not spans:
             return None
-        found = together(finder, spans, self.named)
-        if not self.named:
+        found = together(finder, spans, name in self.named)
+        if name not in self.named:
             first, many = found.run_downs[0], "s" * (len(spans) > 1)
             self.doubts.append(
                 f"wheel {name}: {len(spans)} run-down{many} ({first.start_s:.0f} to {first.stop_s:.0f} s) found by the wheel's "
@@ -285,11 +302,6 @@ class _Study:
 
     def _doubt(self, name: str, fits: list[DragFit], use: WheelUse, limit: float | None) -> None:
         say = self.doubts.append
-        if not fits:
-            say(
-                f"wheel {name}: its drag is not known. No run-down is seen, and in the loop the motor makes up for drag: the "
-                "rate alone does not show it. It takes a run-down, wheel_drag_torque or control_torque"
-            )
         for f in fits:
             if not f.told_apart:
                 say(
