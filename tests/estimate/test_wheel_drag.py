@@ -131,7 +131,7 @@ def test_recovery_of_the_estimates_of_the_flight_software():
 
 def test_recovery_from_the_commanded_torque_of_wheels_without_compensation():
     for seed in (1, 2):
-        f = fly("quiet", friction=True, duration="1500 s", seed=seed, telemetry={"control_torque": "4 s"})
+        f = fly("quiet", friction=True, duration="1000 s", seed=seed, telemetry={"control_torque": "4 s"})
         result = wheel_drag(f.telemetry, f.craft)
         for w in result.wheels:
             assert w.fit.basis == "command" and not w.fit.told_apart
@@ -141,7 +141,7 @@ def test_recovery_from_the_commanded_torque_of_wheels_without_compensation():
 
 def test_commanded_torque_of_wheels_with_compensation_shows_no_drag():
     f = fly(
-        "quiet", friction=True, duration="1500 s", controller={"friction_compensation": True},
+        "quiet", friction=True, duration="1000 s", controller={"friction_compensation": True},
         telemetry={"control_torque": "4 s", "wheel_drag_torque": "0 s"},
     )  # fmt: skip
     result = wheel_drag(f.telemetry, f.craft)
@@ -187,7 +187,7 @@ STEADY = [{"shape": "constant", "torque": "0.005 -0.005 0.002 N m"}]
         ("quiet", {"friction": True, "duration": "1500 s", "torques": STEADY}),
         ("quiet", {"friction": True, "duration": "1500 s", "torques": STEADY, "noise": "none"}),
         ("profile-1", {"friction": True}),
-        ("slews", {"noise": "none"}),
+        ("slews", {"noise": "none", "duration": "900 s"}),
     ],
 )
 def test_in_the_loop_drag_is_not_known_and_the_result_says_so(scenario, changes):

@@ -200,7 +200,7 @@ def test_law_a_wheel_without_motor_coasts_as_its_bearing_has_it_and_the_attitude
     assert np.abs(truth.attitude[:, 1:]).max() < 5e-5
 
 
-def test_law_momentum_grows_by_the_impulse_from_outside_and_energy_by_its_work():
+def test_law_momentum_grows_by_the_impulse_from_outside():
     coasts = [{"wheel": "RWA1", "start": "60 s", "stop": "360 s"}]
     truth = fly("quiet", noise="none", friction=True, coasts=coasts, drag_spikes=SPIKES).truth
     gained = truth.momentum_inertial_Nms[-1] - truth.momentum_inertial_Nms[0]

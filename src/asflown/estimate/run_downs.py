@@ -34,6 +34,8 @@ _OWN_WAYS = 1e-3
 #: Found by shape: the curvature stands out by this many sigma, and viscous drag has a share between these of the drag
 #: at the highest rate.  Less is a motor's straight ramp, more one that is let out exponentially.
 _CURVED, _SHARE = 5.0, (0.1, 0.95)
+#: Time constants from the middle beyond which a trial step of the fit is not followed: exp() would overflow.
+_STEEP = 50.0
 #: Samples beyond this many sigma are not counted.
 _FAR = 5.0
 
@@ -102,7 +104,7 @@ class Span:
 
 def phi(x):
     """(1 - exp(-x)) / x, and its slope."""
-    x = np.asarray(x, float)
+    x = np.clip(np.asarray(x, float), -_STEEP, _STEEP)
     small = np.abs(x) < 1e-4
     safe = np.where(small, 1.0, x)
     value = np.where(small, 1 - x / 2 + x**2 / 6, -np.expm1(-safe) / safe)
@@ -112,7 +114,7 @@ def phi(x):
 
 def coast(s, middle: float, a: float, b: float) -> np.ndarray:
     """|rate| in a coast, s seconds from where it is ``middle``. [rad/s]"""
-    return middle * np.exp(-b * s) - a * s * phi(b * s)[0]
+    return middle * np.exp(-np.clip(b * s, -_STEEP, _STEEP)) - a * s * phi(b * s)[0]
 
 
 def fit_coasts(spans: list[Span]) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
@@ -127,7 +129,7 @@ def fit_coasts(spans: list[Span]) -> tuple[np.ndarray, np.ndarray, list[np.ndarr
         for i, p in enumerate(spans):
             rows = slice(edges[i], edges[i + 1])
             value, slope = phi(x[1] * p.s)
-            decay = np.exp(-x[1] * p.s)
+            decay = np.exp(-np.clip(x[1] * p.s, -_STEEP, _STEEP))
             J[rows, 0] = -p.s * value
             J[rows, 1] = -p.s * x[2 + i] * decay - x[0] * p.s**2 * slope
             J[rows, 2 + i] = decay
@@ -137,13 +139,10 @@ def fit_coasts(spans: list[Span]) -> tuple[np.ndarray, np.ndarray, list[np.ndarr
     middles = [float(c[0]) for c in parabolas]
     _, c1, c2 = parabolas[int(np.argmax([np.ptp(p.s) for p in spans]))]
     b = -2 * c2 / c1 if c1 else 0.0
-    bound = np.full(2 + len(spans), np.inf)
-    bound[1] = 300 / max(float(np.abs(p.s).max()) for p in spans)  # exp() of more overflows
-    b = float(np.clip(b, -0.01 * bound[1], 0.01 * bound[1]))
+    longest = max(float(np.abs(p.s).max()) for p in spans)
+    b = float(np.clip(b, -3 / longest, 3 / longest))
     start = np.array([-c1 - b * middles[0], b, *middles])
-    found = least_squares(
-        residuals, start, jacobian, bounds=(-bound, bound), x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14
-    )
+    found = least_squares(residuals, start, jacobian, method="lm", x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12)
     # scaled, or the inverse of quantities of such different size is taken for singular
     size = np.linalg.norm(found.jac, axis=0)
     size[size == 0] = 1.0
