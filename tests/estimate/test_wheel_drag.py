@@ -184,6 +184,7 @@ STEADY = [{"shape": "constant", "torque": "0.005 -0.005 0.002 N m"}]
     "scenario, changes",
     [
         ("quiet", {}),
+        ("quiet", {"noise": "none"}),
         ("quiet", {"friction": True, "duration": "1500 s", "torques": STEADY}),
         ("quiet", {"friction": True, "duration": "1500 s", "torques": STEADY, "noise": "none"}),
         ("profile-1", {"friction": True}),

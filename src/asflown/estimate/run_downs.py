@@ -135,11 +135,11 @@ def fit_coasts(spans: list[Span]) -> tuple[np.ndarray, np.ndarray, list[np.ndarr
             J[rows, 2 + i] = decay
         return J
 
-    parabolas = [np.polynomial.Polynomial.fit(p.s, p.u, 2).convert().coef for p in spans]
-    middles = [float(c[0]) for c in parabolas]
-    _, c1, c2 = parabolas[int(np.argmax([np.ptp(p.s) for p in spans]))]
-    b = -2 * c2 / c1 if c1 else 0.0
     longest = max(float(np.abs(p.s).max()) for p in spans)
+    parabolas = [np.polyfit(p.s / longest, p.u, 2) for p in spans]
+    middles = [float(c[2]) for c in parabolas]
+    c2, c1, _ = parabolas[int(np.argmax([np.ptp(p.s) for p in spans]))] / longest ** np.array([2, 1, 0])
+    b = -2 * c2 / c1 if c1 else 0.0
     b = float(np.clip(b, -3 / longest, 3 / longest))
     start = np.array([-c1 - b * middles[0], b, *middles])
     found = least_squares(residuals, start, jacobian, method="lm", x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12)
