@@ -16,8 +16,8 @@ from asflown.kit.timeline import utc_to_tai_ns
 from asflown.sim.fly import fly
 from asflown.telemetry.channels import kind_of
 from asflown.telemetry.load import load_telemetry
-from asflown.telemetry.telemetry import Channel, Telemetry
 from asflown.telemetry.tables import write_table
+from asflown.telemetry.telemetry import Channel, Telemetry
 from asflown.trends.wheel_entry import wheel_entry
 from cli.program import complaint, run
 from conftest import ROOT, flight_data
@@ -198,6 +198,24 @@ def test_in_the_loop_drag_is_not_known_and_the_result_says_so(scenario, changes)
         assert w["basis"] is None and w["run_downs"] == [] and w["spikes"] is None
         assert all(w[k] is None for k in ("coulomb_Nm", "viscous_Nms", "drag_at_mean_Nm", "correlation"))
     assert sum("drag is not known of wheel RWA1, RWA2, RWA4" in d for d in result.doubts) == 1
+
+
+def test_wheels_that_slow_together_show_a_torque_not_a_bearing():
+    """A torque that fades bends the courses as viscous drag would; where two wheels only trade momentum, one may coast."""
+    t, w = run_down(11, before=0.0)
+    lost = w - w[0]
+    alone = wheel_drag(telemetry({"wheel_rate_RWA1": (t, w), "wheel_rate_RWA2": (t, 0 * t + 50)}), CASSINI)
+    assert alone.wheel("RWA1").fit is not None
+    # RWA2 speeds up by as much: a torque along neither axis
+    shared = wheel_drag(telemetry({"wheel_rate_RWA1": (t, w), "wheel_rate_RWA2": (t, 50 - lost)}), CASSINI)
+    assert shared.wheel("RWA1").fit is None and any("with other wheels" in d for d in shared.doubts)
+    # before 2003 RWA4 stands parallel to RWA1: what the one loses the other takes up, and no torque acts
+    spare = tuple(
+        x.model_copy(update={"axis": CASSINI.wheels[0].axis}) if x.name == "RWA4" else x for x in CASSINI.wheels
+    )
+    trade = {"wheel_rate_RWA1": (t, w), "wheel_rate_RWA4": (t, 50 - lost)}
+    craft = CASSINI.model_copy(update={"wheels": spare})
+    assert wheel_drag(telemetry(trade), craft).wheel("RWA1").fit is not None
 
 
 @pytest.mark.parametrize("shape", ["ramp", "let out", "braked"])

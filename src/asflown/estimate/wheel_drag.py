@@ -27,6 +27,8 @@ LOW_SPEED = 300 * 2 * np.pi / 60
 #: Torque that turning the momentum with the body takes, as a share of a wheel's slowing: above it, it may be the cause.
 _TURNING = 0.2
 _AS_IT_TURNS = "as the momentum turns with the body"
+#: Momentum that wheels which do not coast gain meanwhile, as a share of what this one loses: above it, a torque acts.
+_SHARED = 0.5
 #: Share of a slowing that the commanded torque explains: above it the motor is at work.
 _COMMANDED = 0.5
 #: Length over which commanded torque and momentum gained are set against each other [s], and how many it takes.
@@ -61,7 +63,8 @@ def wheel_drag(
             )
     study = _Study(telemetry, craft, frozenset(run_down))
     finders = {n: study.finder(n) for n in names}
-    coastings = {n: study.coasting(n, f) for n, f in finders.items()}
+    seen = study.slowing(finders)
+    coastings = {n: study.coasting(n, f, seen[n]) for n, f in finders.items()}
     for name in run_down:
         if coastings[name] is None:
             raise BadInput(
@@ -121,18 +124,27 @@ class _Study:
 
     # ---- run-downs ----------------------------------------------------------------------------------
 
-    def coasting(self, name: str, finder: Finder) -> Coasting | None:
+    def slowing(self, finders: dict[str, Finder]) -> dict[str, list[tuple[int, int, str]]]:
+        """Of each wheel the stretches in which it slows evenly, with what else may be the cause; '' for none."""
+        seen = {
+            n: [(a, b, self._other_cause(n, f, a, b)) for a, b in f.found()] if n not in self.named else []
+            for n, f in finders.items()
+        }
+        return {
+            n: [(a, b, cause or self._shared(n, finders, seen, a, b)) for a, b, cause in stretches]
+            for n, stretches in seen.items()
+        }
+
+    def coasting(self, name: str, finder: Finder, seen: list[tuple[int, int, str]]) -> Coasting | None:
         if name in self.named:
             spans = [(s.start, s.stop) for s in finder.stretches() if finder.falls(s.start, s.stop)]
         else:
-            by_reason: dict[str, list[tuple[int, int]]] = {}
-            for a, b in finder.found():
-                by_reason.setdefault(self._other_cause(name, finder, a, b), []).append((a, b))
-            spans = by_reason.pop("", [])
-            by_reason.pop(_AS_IT_TURNS, None)  # every wheel of a turning craft does that: nobody needs to hear of it
-            for why_not, stretches in by_reason.items():
+            spans = [(a, b) for a, b, cause in seen if not cause]
+            for why_not in dict.fromkeys(cause for _, _, cause in seen):
+                stretches = [(a, b) for a, b, cause in seen if cause == why_not]
                 a, b = max(stretches, key=lambda k: k[1] - k[0])
-                if b - a < 2 * FEWEST:  # so short, a wheel in the loop does it by chance
+                # so short, a wheel in the loop does it by chance; and all wheels of a turning craft do
+                if b - a < 2 * FEWEST or why_not in ("", _AS_IT_TURNS):
                     continue
                 more = f", and in {len(stretches) - 1} more stretches" if len(stretches) > 1 else ""
                 self.doubts.append(
@@ -171,6 +183,31 @@ class _Study:
         if not finder.is_bearing(a, b):
             return "as a motor or a steady torque on the body would have it"
         return ""
+
+    def _shared(self, name: str, finders: dict[str, Finder], seen, a: int, b: int) -> str:
+        """Whether other wheels, which do not coast, change as much meanwhile, as by a torque on the body; else ''.
+
+        Wheels that only trade momentum with this one keep the sum, and are no sign of such a torque."""
+        f = finders[name]
+        start, stop = float(f.t[a]), float(f.t[b - 1])
+        own = self._momentum(name, f, start, stop)
+        others = np.zeros(3)
+        for n, g in finders.items():
+            coasts = n in self.named or any(
+                g.t[c] < stop and g.t[d - 1] > start and not cause for c, d, cause in seen[n]
+            )
+            if n != name and not coasts and len(g.t) and g.t[0] <= start and g.t[-1] >= stop:
+                others += self._momentum(n, g, start, stop)
+        limit = _SHARED * float(np.linalg.norm(own))
+        if np.linalg.norm(others) > limit and np.linalg.norm(own + others) > limit:
+            return "with other wheels, as a torque on the body would have it"
+        return ""
+
+    def _momentum(self, name: str, finder: Finder, start_s: float, stop_s: float) -> np.ndarray:
+        """What a wheel gains from one time to another, body axes; per unit spin inertia where that is not known."""
+        w = self.described(name)
+        first, last = np.interp([start_s, stop_s], finder.t, finder.rate)
+        return (w.spin_inertia or 1.0) * (last - first) * np.array(w.axis)
 
     def _turning(self, name: str, start_s: float, stop_s: float) -> float:
         """Size of what the wheel takes on as the momentum turns with the body, (w x h).a / J. [rad/s^2]"""
