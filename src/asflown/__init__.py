@@ -19,6 +19,8 @@ _PUBLIC = {
     "disturbance_torque": "asflown.estimate.torque",
     "TorqueResult": "asflown.estimate.result",
     "compare_torques": "asflown.estimate.compare",
+    "wheel_drag": "asflown.estimate.wheel_drag",
+    "WheelsResult": "asflown.estimate.wheel_result",
     "Scenario": "asflown.sim.scenario",
     "load_scenario": "asflown.sim.scenario",
     "fly": "asflown.sim.fly",
@@ -51,6 +53,8 @@ if TYPE_CHECKING:
     from asflown.estimate.compare import compare_torques
     from asflown.estimate.result import TorqueResult
     from asflown.estimate.torque import disturbance_torque
+    from asflown.estimate.wheel_drag import wheel_drag
+    from asflown.estimate.wheel_result import WheelsResult
     from asflown.kit.errors import BadInput
     from asflown.sim.fly import fly, write_flight
     from asflown.sim.fly_mission import fly_mission

@@ -97,7 +97,7 @@ def test_law_runge_kutta_is_of_fourth_order():
     plant, ends = small_body(), []
     for steps in (80, 160, 320, 2560):
         x = TUMBLING.copy()
-        advance(0.0, x, MOTORS, plant, 4.0 / steps, steps, np.empty((5, len(x))))
+        advance(0.0, x, MOTORS, np.zeros(3), plant, 4.0 / steps, steps, np.empty((5, len(x))))
         ends.append(x[:12])
     errors = [np.abs(x - ends[-1]).max() for x in ends[:3]]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
@@ -116,7 +116,7 @@ def test_law_energy_balances_with_a_heavy_mode():
                 + w @ plant.coupling[0] * eta_dot + 0.5 * eta_dot**2 + 2.0 * eta**2)  # fmt: skip
 
     before = held(x)
-    advance(0.0, x, MOTORS, plant, 0.001, 20_000, np.empty((5, len(x))))
+    advance(0.0, x, MOTORS, np.zeros(3), plant, 0.001, 20_000, np.empty((5, len(x))))
     by_torque, by_motors, in_bearings, in_modes = x[12:]
     assert by_torque == 0 and in_bearings == 0 and in_modes > 1e-3
     assert abs(held(x) - before - by_motors + in_modes) < 1e-8 * in_modes

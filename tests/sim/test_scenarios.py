@@ -14,7 +14,8 @@ from asflown.sim.scenario import load_scenario, shipped_scenarios
 
 
 def test_shipped_scenarios_are_those_promised():
-    assert set(shipped_scenarios()) >= {"profile-1", "profile-2", "cover-deploy", "cover-stow", "slews", "quiet"}
+    assert set(shipped_scenarios()) >= {"profile-1", "profile-2", "cover-deploy", "cover-stow", "slews", "quiet",
+                                           "wheel-run-down"}  # fmt: skip
     for name in shipped_scenarios():
         scenario = load_scenario(name)
         assert scenario.name == name and scenario.description and scenario.assumptions
@@ -177,3 +178,55 @@ def test_the_command_writes_and_reports(tmp_path):
     said = json.loads(done.stdout)
     assert said["command"] == "simulate" and said["ended"] == "reached 480 s" and said["seed"] == 1
     assert all((tmp_path / n).is_file() for n in ("telemetry.csv", "truth.csv", "truth.json"))
+
+
+def test_law_a_wheel_without_motor_coasts_as_its_bearing_has_it_and_the_attitude_is_held():
+    """Against the law of Coulomb and viscous drag in closed form; the other wheels stay in the loop."""
+    coasts = [{"wheel": "RWA1", "start": "60 s", "stop": "360 s"}]
+    flight = fly("quiet", noise="none", friction=True, controller={"friction_compensation": True}, coasts=coasts)
+    t, truth = flight.truth.time_s, flight.truth
+    coasting = (t >= 60) & (t < 360)
+    assert np.all(truth.motor_torque_Nm[coasting, 0] == 0) and np.all(truth.motor_torque_Nm[:, 1:] != 0)
+    assert np.all(truth.holding_torque_Nm[~coasting] == 0)
+    wheel = flight.craft.at(flight.scenario.epoch_ns).wheel("RWA1")
+    a, b = wheel.drag.coulomb / wheel.spin_inertia, wheel.drag.viscous / wheel.spin_inertia
+    u = truth.wheel_rate_rad_s[coasting, 0]
+    # what the body's rate changes by counts for the wheel
+    u = u + (truth.body_rate_rad_s @ wheel.axis)[coasting]
+    expected = (u[0] + a / b) * np.exp(-b * (t[coasting] - 60)) - a / b
+    assert np.abs(u - expected).max() < 1e-8  # rad/s
+    drag = 0.16138 * (a + b * u[-1])
+    assert truth.holding_torque_Nm[coasting][-1] == pytest.approx(-drag * np.array(wheel.axis), abs=2e-5)
+    assert np.abs(truth.attitude[:, 1:]).max() < 5e-5
+
+
+def test_law_momentum_grows_by_the_impulse_from_outside():
+    coasts = [{"wheel": "RWA1", "start": "60 s", "stop": "360 s"}]
+    truth = fly("quiet", noise="none", friction=True, coasts=coasts, drag_spikes=SPIKES).truth
+    gained = truth.momentum_inertial_Nms[-1] - truth.momentum_inertial_Nms[0]
+    impulse = truth.holding_torque_Nm[:-1].sum(axis=0) * 0.125
+    assert gained == pytest.approx(impulse, abs=2e-4 * np.abs(impulse).max()) and np.abs(impulse).max() > 0.5
+
+
+SPIKES = [{"wheel": "RWA4", "start": "100 s", "duration": "50 s", "torque": "0.01 N m"},
+          {"wheel": "RWA4", "start": "140 s", "duration": "50 s", "torque": "0.01 N m"}]  # fmt: skip
+
+
+def test_law_drag_spikes_only_move_momentum_between_wheel_and_body():
+    flight = fly("quiet", friction=True, noise="none", drag_spikes=SPIKES)
+    H = flight.truth.momentum_inertial_Nms
+    assert np.abs(H - H[0]).max() < 1e-10 * np.linalg.norm(H[0])
+    plain = fly("quiet", friction=True, noise="none").truth
+    lost = (plain.wheel_rate_rad_s - flight.truth.wheel_rate_rad_s)[:, 2] * 0.16138
+    at = np.searchsorted(flight.truth.time_s, [99.0, 101.5])
+    assert abs(lost[at[0]]) < 1e-12 and lost[at[1]] == pytest.approx(0.01, rel=0.05)  # 1 s at 0.01 N m
+
+
+@pytest.mark.parametrize("key", ["coasts", "drag_spikes"])
+def test_coasts_and_spikes_name_a_wheel_that_is_there(key):
+    more = {"stop": "20 s"} if key == "coasts" else {"duration": "20 s", "torque": "0.01 N m"}
+    with pytest.raises(BadInput, match="'RWA3', which cassini does not run"):
+        fly("quiet", **{key: [{"wheel": "RWA3", "start": "10 s"} | more]})
+    with pytest.raises(BadInput):
+        bad = {"stop": "5 s"} if key == "coasts" else {"duration": "0 s", "torque": "0.01 N m"}
+        fly("quiet", **{key: [{"wheel": "RWA1", "start": "10 s"} | bad]})

@@ -16,6 +16,7 @@ from .command import commanded_motion
 from .controllers import wheel_loop
 from .cover import MovingPart, motor_telemetry, moving_part
 from .disturbances import profile_peaks, torque_table
+from .faults import coasting, drag_table
 from .plant import Errors, Loop, Plant, fly_cycles, moving_part_history
 from .sampling import axes_of, telemetry_of
 from .scenario import Scenario, load_scenario
@@ -41,6 +42,7 @@ class Truth:
     momentum_inertial_Nms: np.ndarray  # (N, 3), of everything, inertial axes
     control_torque_Nm: np.ndarray  # (N, 3), as the controller orders it
     motor_torque_Nm: np.ndarray  # (N, wheels), held until the next instant
+    holding_torque_Nm: np.ndarray  # (N, 3), from outside in place of coasting wheels, held until the next instant
     estimation_error_rad: np.ndarray  # (N, 3), estimated less true attitude
     mode_amplitude: np.ndarray  # (N, modes), hybrid coordinates [kg(1/2) m]
     mode_rate: np.ndarray  # (N, modes)
@@ -98,10 +100,12 @@ def fly(scenario, *, craft=None, seed: int | None = None, noise: str | None = No
     times = loop.period * np.arange(-before, cycles)
     q_c, w_c, alpha_c = commanded_motion(scenario.slews, times)
     errors = _errors(scenario, loop, len(times), len(now.wheels))
+    names = tuple(w.name for w in now.wheels)
     x = _start(scenario, now, plant, q_c[0])
-    record = np.zeros((len(times), len(x) + 15 + 3 * len(now.wheels)))
+    record = np.zeros((len(times), len(x) + 18 + 3 * len(now.wheels)))
     tell(f"flying {scenario.name}: {scenario.settle + scenario.duration:g} s in {len(times)} control cycles")
-    flown, full = fly_cycles(plant, loop, errors, q_c, w_c, alpha_c, times[0], x, record)
+    off = coasting(scenario, names, times)
+    flown, full = fly_cycles(plant, loop, errors, off, q_c, w_c, alpha_c, times[0], x, record)
     if flown <= before:
         raise BadInput(
             f"wheel {now.wheels[full].name} is at its rate limit before the recording starts",
@@ -123,7 +127,6 @@ def fly(scenario, *, craft=None, seed: int | None = None, noise: str | None = No
     command = (w_c[before:flown], q_c[before:flown])
     readings = _readings(rows, columns, truth, command, now, scenario, part)
     telemetry = telemetry_of(readings, scenario, loop.period, scenario.seed, scenario.name)
-    names = tuple(w.name for w in now.wheels)
     return Flight(telemetry, truth, scenario, craft, now.inertia_kgm2, names, scenario.seed, ended, now.doubts)
 
 
@@ -134,10 +137,12 @@ def _check_flyable(scenario: Scenario, now: CraftAt) -> None:
             f"{now.craft.name} cannot be flown: its inertia or its wheels' spin inertia is not known",
             remedy="Fly a craft whose file gives both, or give --inertia and a craft file with the wheels' inertia.",
         )
-    for name in scenario.wheel_rates:
+    asked = [("wheel_rates", n) for n in scenario.wheel_rates]
+    asked += [("a coast", c.wheel) for c in scenario.coasts] + [("a drag spike", d.wheel) for d in scenario.drag_spikes]
+    for what, name in asked:
         if name not in names:
             raise BadInput(
-                f"wheel_rates names {name!r}, which {now.craft.name} does not run on {scenario.epoch[:10]}",
+                f"{what} names {name!r}, which {now.craft.name} does not run on {scenario.epoch[:10]}",
                 remedy=f"Its wheels then: {some_of(names)}.",
             )
 
@@ -154,6 +159,7 @@ def _plant(scenario: Scenario, now: CraftAt, part: MovingPart | None) -> Plant:
         )
     drag = [(w.drag.viscous, w.drag.coulomb, w.drag.stiction) if scenario.friction else (0.0,) * 3 for w in now.wheels]
     times, torques = torque_table(scenario)
+    spike_times, spikes = drag_table(scenario, tuple(w.name for w in now.wheels))
     zero = np.zeros(3)
     return Plant(
         fixed_inertia=np.ascontiguousarray(part.rest_inertia if part else now.inertia_kgm2, float),
@@ -172,6 +178,8 @@ def _plant(scenario: Scenario, now: CraftAt, part: MovingPart | None) -> Plant:
         reduced_mass=part.reduced_mass if part else 0.0,
         motion_time=part.times if part else np.empty(0),
         motion_angle=part.quartics if part else np.empty((5, 0)),
+        extra_drag_time=spike_times,
+        extra_drag=spikes,
     )
 
 
@@ -205,7 +213,7 @@ class _Columns:
         m = len(plant.mode_damping)
         widths = {"attitude": 4, "rate": 3, "wheel_rate": n, "mode": m, "mode_rate": m, "ledger": 4, "estimation_error": 3,
                   "attitude_error": 3, "rate_estimate": 3, "controller_rate_error": 3, "control_torque": 3,
-                  "motor_torque": n, "drag_estimate": n, "wheel_reading": n}  # fmt: skip
+                  "motor_torque": n, "drag_estimate": n, "wheel_reading": n, "outside": 3}  # fmt: skip
         at = 0
         for name, width in widths.items():
             setattr(self, name, slice(at, at + width))
@@ -235,6 +243,7 @@ def _truth(rows, times, columns, plant: Plant, now: CraftAt, scenario: Scenario,
         momentum_inertial_Nms=rotation(attitude).apply(H),
         control_torque_Nm=rows[:, columns.control_torque],
         motor_torque_Nm=rows[:, columns.motor_torque],
+        holding_torque_Nm=rows[:, columns.outside],
         estimation_error_rad=rows[:, columns.estimation_error],
         mode_amplitude=rows[:, columns.mode],
         mode_rate=rows[:, columns.mode_rate],

@@ -47,6 +47,8 @@ class Plant(NamedTuple):
     reduced_mass: float
     motion_time: np.ndarray  # (b + 1,); (0,) without a moving part
     motion_angle: np.ndarray  # (5, b), quartics, highest power first
+    extra_drag_time: np.ndarray = np.empty(0)  # (s,), drag spikes, linear between; (0,) without any
+    extra_drag: np.ndarray = np.empty((0, 0))  # (s, n), opposing each wheel's rate
 
 
 class Loop(NamedTuple):
@@ -131,6 +133,16 @@ def external_torque(t, times, values, out):
 
 
 @jit
+def extra_drag(t, times, values, wheel):
+    """What a drag spike adds to one wheel's Coulomb drag: linear between the table's instants, zero outside. [N m]"""
+    j = np.searchsorted(times, t)
+    if j == 0 or j == len(times):
+        return 0.0
+    x = (t - times[j - 1]) / (times[j] - times[j - 1])
+    return (1 - x) * values[j - 1, wheel] + x * values[j, wheel]
+
+
+@jit
 def moving_part_motion(t, times, quartic):
     """Angle, rate and acceleration of the moving part: quartics between breaks, at rest outside."""
     last = len(times) - 1
@@ -190,7 +202,7 @@ def moving_part_history(times, rates, plant):
 
 
 @jit
-def _derivative(t, x, motor, plant, dx):
+def _derivative(t, x, motor, outside, plant, dx):
     """State: q (4), w (3), rho (n), eta (m), eta_dot (m), then the energy ledger of four: work by the
     external torque, work by the motors, loss in the bearings, loss in the modes. [J]"""
     n, m = len(plant.spin_inertia), len(plant.mode_damping)
@@ -206,6 +218,7 @@ def _derivative(t, x, motor, plant, dx):
 
     torque, gyroscopic, H, right = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     external_torque(t, plant.torque_time, plant.torque, torque)
+    torque += outside
     ledger[0] = torque[0] * w[0] + torque[1] * w[1] + torque[2] * w[2]
     mass = plant.fixed_inertia.copy()
     H[:] = 0.0
@@ -225,6 +238,9 @@ def _derivative(t, x, motor, plant, dx):
     for k in range(n):
         J, a = plant.spin_inertia[k], plant.wheel_axes[k]
         drag = drag_torque(rho[k], plant.drag[k, 0], plant.drag[k, 1], plant.drag[k, 2])
+        if len(plant.extra_drag_time) > 0:
+            more = extra_drag(t, plant.extra_drag_time, plant.extra_drag, k)
+            drag += more * np.tanh(rho[k] / DRAG_REVERSAL_RATE)
         dx[7 + k] = (motor[k] - drag) / J
         ledger[1] += motor[k] * rho[k]
         ledger[2] += drag * rho[k]
@@ -259,18 +275,19 @@ def _derivative(t, x, motor, plant, dx):
 
 
 @jit
-def advance(t, x, motor, plant, step, steps, work):
-    """``steps`` Runge-Kutta steps of fourth order with the motor torques held; ``work`` is (5, len(x))."""
+def advance(t, x, motor, outside, plant, step, steps, work):
+    """``steps`` Runge-Kutta steps of fourth order, the motor torques (n,) and a torque on the body from ``outside``
+    (3,) held; ``work`` is (5, len(x))."""
     k1, k2, k3, k4, y = work[0], work[1], work[2], work[3], work[4]
     for s in range(steps):
         ts = t + s * step
-        _derivative(ts, x, motor, plant, k1)
+        _derivative(ts, x, motor, outside, plant, k1)
         y[:] = x + 0.5 * step * k1
-        _derivative(ts + 0.5 * step, y, motor, plant, k2)
+        _derivative(ts + 0.5 * step, y, motor, outside, plant, k2)
         y[:] = x + 0.5 * step * k2
-        _derivative(ts + 0.5 * step, y, motor, plant, k3)
+        _derivative(ts + 0.5 * step, y, motor, outside, plant, k3)
         y[:] = x + step * k3
-        _derivative(ts + step, y, motor, plant, k4)
+        _derivative(ts + step, y, motor, outside, plant, k4)
         x += step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         # rounding and truncation only (below 1e-12 a step): momentum does not depend on it
         x[:4] /= np.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2 + x[3] ** 2)
@@ -295,12 +312,13 @@ def _attitude_error(q, offset, q_c, out):
 
 
 @jit
-def fly_cycles(plant, loop, errors, q_c, w_c, alpha_c, first_time, x, record):
+def fly_cycles(plant, loop, errors, coasting, q_c, w_c, alpha_c, first_time, x, record):
     """Control cycles from ``first_time`` on, one row of ``record`` each, before its torque acts.
 
     Row: state, then estimation error (3), attitude error (3), estimated rate (3), controller rate
     error (3), commanded torque on the body (3), motor torques (n), drag estimates (n), measured wheel
-    rates (n).  Returns the rows written and the wheel that reached its rate limit (-1: none)."""
+    rates (n), torque from outside (3).  Where ``coasting``, (N, n) bool, a wheel's motor is off, and what it
+    would have given the body comes from outside, exactly and at once.  Returns the rows written and the wheel that reached its rate limit (-1: none)."""
     n, size = len(plant.spin_inertia), len(x)
     cycles = len(record)
     work = np.empty((5, size))
@@ -313,7 +331,7 @@ def fly_cycles(plant, loop, errors, q_c, w_c, alpha_c, first_time, x, record):
     motor, drag_estimate, measured = np.zeros(n), np.zeros(n), np.zeros(n)
     waiting = np.zeros((loop.delay_cycles + 1, n))
     expected = plant.spin_inertia * x[7 : 7 + n]  # wheel momentum the commands alone would give
-    integral, ordered = np.zeros(n), np.zeros(n)
+    integral, ordered, outside = np.zeros(n), np.zeros(n), np.zeros(3)
     step = loop.period / loop.substeps
 
     for cycle in range(cycles):
@@ -361,8 +379,14 @@ def fly_cycles(plant, loop, errors, q_c, w_c, alpha_c, first_time, x, record):
                 drag_estimate[k] = loop.friction_kp * lag + integral[k]
             waiting[cycle % (loop.delay_cycles + 1), k] = wanted
         now = (cycle + 1) % (loop.delay_cycles + 1)
+        outside[:] = 0.0
         for k in range(n):
             ordered[k] = waiting[now, k] if cycle >= loop.delay_cycles else 0.0
+            if coasting[cycle, k]:
+                motor[k] = 0.0
+                for i in range(3):
+                    outside[i] -= ordered[k] * plant.wheel_axes[k, i]
+                continue
             motor[k] = min(max(ordered[k] + drag_estimate[k], -loop.torque_limit[k]), loop.torque_limit[k])
 
         row = record[cycle]
@@ -375,11 +399,12 @@ def fly_cycles(plant, loop, errors, q_c, w_c, alpha_c, first_time, x, record):
         row[size + 15 : size + 15 + n] = motor
         row[size + 15 + n : size + 15 + 2 * n] = drag_estimate
         row[size + 15 + 2 * n : size + 15 + 3 * n] = measured
+        row[size + 15 + 3 * n :] = outside
         for k in range(n):
             if abs(x[7 + k]) >= loop.rate_limit[k]:
                 return cycle + 1, k
-        advance(t, x, motor, plant, step, loop.substeps, work)
+        advance(t, x, motor, outside, plant, step, loop.substeps, work)
         for k in range(n):
-            # a saturated motor is the controller's doing, not drag
+            # a saturated motor is the controller's doing, not drag; nor is one that is off
             expected[k] += (motor[k] - drag_estimate[k]) * loop.period
     return cycles, -1

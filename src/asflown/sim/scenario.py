@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, model_validator
@@ -121,6 +121,35 @@ class Slew(_Part):
         if np.linalg.norm(self.axis) == 0 or self.rate <= 0 or self.acceleration <= 0:
             raise ValueError("a slew needs an axis, a positive rate and a positive acceleration")
         return self
+
+
+class Coast(_Part):
+    """A wheel left to its bearing: the motor is off, and an ideal torque from outside does its part of the hold.
+
+    001 holds the attitude with thrusters in a run-down; their pulses are not modelled here."""
+
+    wheel: str
+    start: Second
+    stop: Second
+
+    @model_validator(mode="after")
+    def _forward(self):
+        if self.stop <= self.start:
+            raise ValueError("a coast stops after it starts")
+        return self
+
+
+class DragSpike(_Part):
+    """Drag of one bearing that rises by ``torque`` for a while, as where its cage turns unstable.
+
+    It comes and goes within EDGE_S, or a quarter of its duration."""
+
+    EDGE_S: ClassVar[float] = 1.0
+
+    wheel: str
+    start: Second
+    duration: Second = Field(gt=0)
+    torque: NewtonMetre = Field(gt=0)
 
 
 class CoverMotion(_Part):
@@ -238,6 +267,8 @@ class Scenario(_Part):
     wheel_rates: _by_name("rad/s") = Field(default_factory=dict)  # type: ignore[valid-type]
     torques: tuple[AnyTorque, ...] = ()
     slews: tuple[Slew, ...] = ()
+    coasts: tuple[Coast, ...] = ()
+    drag_spikes: tuple[DragSpike, ...] = ()
     cover: CoverMotion | None = None
     controller: Controller = Controller()
     telemetry: Sampling = Sampling()

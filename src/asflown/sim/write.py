@@ -43,6 +43,8 @@ def truth_table(flight) -> str:
     add("momentum_inertial", "N m s", truth.momentum_inertial_Nms, AXES)
     add("control_torque", "N m", truth.control_torque_Nm, AXES)
     add("estimation_error", "rad", truth.estimation_error_rad, AXES)
+    if flight.scenario.coasts:
+        add("holding_torque", "N m", truth.holding_torque_Nm, AXES)
     if truth.cover_angle_rad is not None:
         columns["cover_angle [rad]"] = truth.cover_angle_rad
     head = [
@@ -70,10 +72,22 @@ def truth_record(flight) -> dict:
         "controller_inertia_kg_m2": None if scenario.controller.inertia is None else list(scenario.controller.inertia),
         "wheels": list(flight.wheels),
         "torque_profile": [source.model_dump() for source in scenario.torques],
+        "coasts": [c.model_dump() for c in scenario.coasts],
+        "drag_spikes": [d.model_dump() for d in scenario.drag_spikes],
+        "wheel_drag": _drag_of(flight),
         "peaks": [{"time_s": t, "torque_Nm": T, "axis": a} for t, T, a in truth.peaks],
         "assumptions": list(scenario.assumptions),
         "doubts": list(flight.doubts),
         "as_written": scenario.as_written,
         "versions": {"python": platform.python_version()}
         | {p: version(p) for p in ("asflown", "numpy", "scipy", "numba")},
+    }
+
+
+def _drag_of(flight) -> dict:
+    """Bearing drag of every wheel as flown; nothing where friction was off."""
+    wheels = flight.craft.at(flight.scenario.epoch_ns).wheels if flight.scenario.friction else ()
+    return {
+        w.name: {"viscous_Nms": w.drag.viscous, "coulomb_Nm": w.drag.coulomb, "stiction_Nm": w.drag.stiction}
+        for w in wheels
     }

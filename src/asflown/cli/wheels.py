@@ -1,0 +1,53 @@
+"""The verb `wheels`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+from .options import CHANNELS, CRAFT, EXCLUDE, JSON, START, STOP, craft_from, hashes, telemetry_from
+from .output import print_doubts, print_json, provenance, say
+
+
+def wheels(
+    file: Path = typer.Argument(help="Telemetry: CSV (plain or gzip), Parquet, NetCDF or HDF5."),
+    craft: str = CRAFT,
+    run_down: str = typer.Option(
+        None, "--run-down", help='Wheels whose motor is off in all of the window, as in "RWA1,RWA2".'
+    ),
+    low_speed: str = typer.Option("300 rpm", "--low-speed", help="Below it a wheel dwells (assumed: 300 rpm)."),
+    start: str = START,
+    stop: str = STOP,
+    channels: Path = CHANNELS,
+    exclude: Path = EXCLUDE,
+    plot: Path = typer.Option(None, "--plot", help="Draw rates and drag (SVG, PNG or PDF by its suffix)."),
+    json: bool = JSON,
+) -> None:
+    """Bearing drag of every wheel, drag spikes, dwell at low speed, zero crossings and revolutions."""
+    from asflown.estimate.wheel_drag import wheel_drag
+    from asflown.kit.files import check_place
+    from asflown.kit.quantities import quantity
+
+    if plot is not None:
+        from asflown.plots.figure import picture_kind
+
+        check_place(plot)
+        picture_kind(plot)
+    ship = craft_from(craft, None, None)
+    low = quantity(low_speed, "rad/s")
+    telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
+    named = () if run_down is None else tuple(n.strip() for n in run_down.split(","))
+    result = wheel_drag(telemetry, ship, low_speed=low, run_down=named)
+    options = {"craft": craft, "run_down": run_down, "low_speed": low_speed, "start": start, "stop": stop}
+    if plot is not None:
+        from asflown.plots.wheels import save_wheels_figure
+
+        save_wheels_figure(result, plot)
+        say(f"wrote {plot}")
+    if json:
+        origin = provenance(inputs | hashes(craft), options)
+        print_json({"command": "wheels"} | result.record() | {"provenance": origin})
+        return
+    print(result)
+    print_doubts(result.doubts)

@@ -1,0 +1,48 @@
+"""What is kept of the wheels of one record: drag, spikes and use, beside what is kept of actuations."""
+
+from __future__ import annotations
+
+import math
+
+from ..craft.model import Craft
+from ..estimate.wheel_result import WheelDrag, WheelsResult
+from ..kit.errors import BadInput
+from ..kit.timeline import utc_label
+from ..telemetry.telemetry import Telemetry
+from .entry import Entry, Value
+
+KIND = "wheels"
+_BASIS = "telemetry"
+
+
+def wheel_entry(result: WheelsResult, telemetry: Telemetry, craft: Craft, event_id: str, provenance: dict) -> Entry:
+    """The entry of one record; its date is that of the first sample.
+
+    Raises BadInput for telemetry without an epoch: what has no date has no place in a trend."""
+    if not telemetry.dated:
+        raise BadInput(
+            "the telemetry has no epoch, so its wheels have no place in a trend",
+            file=telemetry.source or None,
+            remedy="Put '# epoch: 2015-09-29T00:00:00 UTC' at the head of the file.",
+        )
+    values = tuple(v for w in result.wheels for v in _values(w))
+    date = utc_label(telemetry.span()[0])
+    return Entry(craft.name, event_id, KIND, date, values=values, doubts=result.doubts, provenance=provenance)
+
+
+def _values(w: WheelDrag):
+    f = w.fit
+    torque, per_rate = ("N m", "N m s")
+    if f is not None and f.relative:
+        torque, per_rate = "rad/s^2, per unit spin inertia", "1/s, per unit spin inertia"
+
+    def of(figure: str, value, sigma, unit: str) -> Value:
+        known = value is not None and math.isfinite(value)
+        return Value(f"{figure}_{w.name}", _BASIS, float(value) if known else None, sigma if known else None, unit)
+
+    yield of("coulomb_drag", f and f.coulomb, f and f.sigma_coulomb, torque)
+    yield of("viscous_drag", f and f.viscous, f and f.sigma_viscous, per_rate)
+    yield of("drag_spikes", None if w.spikes is None else len(w.spikes), None, "")
+    yield of("low_speed_dwell", w.use.low_speed_dwell_s, None, "s")
+    yield of("zero_crossings", w.use.zero_crossings, None, "")
+    yield of("revolutions", w.use.revolutions, None, "")
