@@ -20,7 +20,7 @@ def page(tmp_path_factory):
     entries = history(change=0.3, curves=True, seed=1)
     healths = [judge(entries, kind=k, cycles_allowed=20) for k in ("deploy", "stow")]
     out = tmp_path_factory.mktemp("report") / "report.html"
-    twin, record = write_report(healths, [], out, {"options": {"store": "a & <b>"}, "inputs": []})
+    twin, record = write_report(healths, out, {"options": {"store": "a & <b>"}, "inputs": []})
     return out, twin, record
 
 

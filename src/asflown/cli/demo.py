@@ -166,9 +166,9 @@ def _mission(out: Path) -> dict:
     with TrendStore.open(store) as trends:
         trends.add(entries)
     say("judging and drawing")
-    healths, others = health_of(str(store), None, [])
+    healths = health_of(str(store), None, [])
     page = out / "report.html"
-    write_report(healths, others, page, plain(provenance({}, {"store": str(store)}, SEED)))
+    write_report(healths, page, plain(provenance({}, {"store": str(store)}, SEED)))
     deploys = healths[0]
     wanted = {name.rpartition("_N")[0]: v for name, v in truth["law"]["change_percent"].items()}
     changes = [

@@ -28,9 +28,9 @@ def report(
     check_place(out.with_suffix(".json"))
     from asflown.report.page import write_report
 
-    healths, others = health_of(store, craft, limit)
+    healths = health_of(store, craft, limit)
     origin = provenance({}, {"store": without_password(store), "craft": craft, "limit": list(limit)})
-    twin, record = write_report(healths, others, out, plain(origin))
+    twin, record = write_report(healths, out, plain(origin))
     if json:
         print_json(record)
         return

@@ -16,7 +16,7 @@ app = typer.Typer(
 )
 
 STORE = typer.Option(..., "--store", help="A path (SQLite) or a URL (sqlite:///…, postgresql://…).")
-KIND = typer.Option("deploy", "--kind", help="deploy or stow.")
+KIND = typer.Option("deploy", "--kind", help="deploy, stow or wheels.")
 WHOSE = typer.Option(None, "--craft", help="Which craft's, where the store holds several.")
 FIGURES = typer.Option(None, "--figures", help="A Python file that declares further figures of merit.")
 LIMIT = typer.Option([], "--limit", help='A figure\'s limit, as in "angular_impulse=-0.5 N m s"; may be repeated.')
@@ -294,19 +294,36 @@ def _entries(store: str, craft: str | None, curves: bool):
 
 
 def health_of(store: str, craft: str | None, limits: list[str]):
-    """Verdicts over every kind of actuation that has figures, deploys first, and the entries of other kinds."""
+    """Verdicts over every kind in the store that has figures: deploys, stows, wheels."""
     from asflown.kit.errors import BadInput
-    from asflown.trends.verdicts import judge
+    from asflown.trends.verdicts import MOVES, judge
 
     entries, name = _entries(store, craft, curves=True)
-    moves = [e for e in entries if e.kind in ("deploy", "stow")]
-    kinds = [k for k in ("deploy", "stow") if any(e.kind == k and e.values for e in moves)]
+    kinds = [k for k in (*MOVES, "wheels") if any(e.kind == k and e.values for e in entries)]
     if not kinds:
-        raise BadInput("the store holds no actuation with figures of merit", file=without_password(store),
-                       remedy="`asflown trend add` fills it.")  # fmt: skip
-    allowed, limit = _cycles_allowed(name, moves), _limits(limits, moves)
-    healths = [judge(moves, kind=k, cycles_allowed=allowed, limits=limit) for k in kinds]
-    return healths, [e for e in entries if e.kind not in ("deploy", "stow")]
+        raise BadInput("the store holds nothing with figures of merit", file=without_password(store),
+                       remedy="`asflown trend add` and `asflown wheels --store` fill it.")  # fmt: skip
+    allowed, limit = _cycles_allowed(name, entries), _limits(limits, entries)
+    return [
+        judge(_of(kind, entries), kind=kind, cycles_allowed=_if_moved(kind, allowed), limits=limit) for kind in kinds
+    ]
+
+
+def _of(kind: str, entries):
+    """Entries that count for a kind: all actuations, for rests and cycles; or that kind alone."""
+    from asflown.trends.verdicts import MOVES
+
+    return (
+        [e for e in entries if e.kind in MOVES or e.kind == kind]
+        if kind in MOVES
+        else [e for e in entries if e.kind == kind]
+    )
+
+
+def _if_moved(kind: str, allowed: int | None) -> int | None:
+    from asflown.trends.verdicts import MOVES
+
+    return allowed if kind in MOVES else None
 
 
 def _health(store: str, craft: str | None, kind: str, limits: list[str], **options):

@@ -21,6 +21,8 @@ def wheels(
     stop: str = STOP,
     channels: Path = CHANNELS,
     exclude: Path = EXCLUDE,
+    store: str = typer.Option(None, "--store", help="Keep the result in a trend store: a path (SQLite) or a URL."),
+    name: str = typer.Option(None, "--id", help="Its name in the store; the date unless given."),
     plot: Path = typer.Option(None, "--plot", help="Draw rates and drag (SVG, PNG or PDF by its suffix)."),
     json: bool = JSON,
 ) -> None:
@@ -40,14 +42,26 @@ def wheels(
     named = () if run_down is None else tuple(n.strip() for n in run_down.split(","))
     result = wheel_drag(telemetry, ship, low_speed=low, run_down=named)
     options = {"craft": craft, "run_down": run_down, "low_speed": low_speed, "start": start, "stop": stop}
+    origin = provenance(inputs | hashes(craft), options)
+    if store is not None:
+        kept = _kept(store, name, result, telemetry, ship, origin)
+        say(f"kept as {kept.event}, revision {kept.revision}")
     if plot is not None:
         from asflown.plots.wheels import save_wheels_figure
 
         save_wheels_figure(result, plot)
         say(f"wrote {plot}")
     if json:
-        origin = provenance(inputs | hashes(craft), options)
         print_json({"command": "wheels"} | result.record() | {"provenance": origin})
         return
     print(result)
     print_doubts(result.doubts)
+
+
+def _kept(store: str, name: str | None, result, telemetry, ship, origin):
+    from asflown.trends.store import TrendStore
+    from asflown.trends.wheel_entry import wheel_entry
+
+    entry = wheel_entry(result, telemetry, ship, name, origin)
+    with TrendStore.open(store) as trends:
+        return trends.add(entry)[0]

@@ -18,9 +18,8 @@ from ..kit.files import write_text
 from ..kit.plain import plain
 from ..plots import trend as draw
 from ..plots.figure import BLUE, GREY, save_svg
-from ..trends.entry import Entry
 from ..trends.record import health_record
-from ..trends.verdicts import FigureHealth, Health
+from ..trends.verdicts import MOVES, FigureHealth, Health
 
 #: Ink in which the pictures are drawn, to be replaced by the page's.
 _INK, _GRID = "#010203", "#e4e4e4"
@@ -33,22 +32,20 @@ class Picture:
     svg: str
 
 
-def write_report(healths: list[Health], others: list[Entry], out: Path, provenance: dict) -> tuple[Path, dict]:
+def write_report(healths: list[Health], out: Path, provenance: dict) -> tuple[Path, dict]:
     """The page at ``out`` and its JSON twin beside it; returns the twin's path and what it holds.
 
-    ``healths``: a verdict for each kind of actuation, the one that decides first; ``others``: entries of other kinds
-    (wheels).  Raises BadInput where the places cannot be written."""
+    ``healths``: a verdict for each kind, the one that decides first.  Raises BadInput where the places cannot be written."""
     from .. import __version__
 
     twin = out.with_suffix(".json")
     record = {
         "command": "report", "verdict": healths[0].verdict, "reasons": list(healths[0].reasons),
         "kinds": [health_record(h) for h in healths],
-        "wheels": [_entry_record(e) for e in others],
         "doubts": list(dict.fromkeys(d for h in healths for d in h.doubts)), "provenance": provenance,
     }  # fmt: skip
     page = _template().render(
-        healths=healths, main=healths[0], sections=[(h, _pictures(h)) for h in healths], wheels=others,
+        healths=healths, main=healths[0], sections=[(h, _pictures(h)) for h in healths],
         record=record, provenance=provenance, version=__version__,
     )  # fmt: skip
     write_text(out, page)
@@ -70,8 +67,14 @@ def _pictures(h: Health) -> list[Picture]:
         if found:
             add(name, f"{name.replace('_', ' ')} over the years", _trend_words(found[0]), draw.trend_figure(*found))
     for f in h.figures:
-        if f.verdict != "pass" and f.figure not in ("angular_impulse", "peak_positive", "peak_negative"):
+        if (f.verdict != "pass" or (h.kind not in MOVES and f.trend_p_adjusted is not None)) and f.figure not in (
+            "angular_impulse",
+            "peak_positive",
+            "peak_negative",
+        ):
             add(f.figure, f"{f.figure.replace('_', ' ')} over the years", _trend_words(f), draw.trend_figure(f))
+    if h.kind not in MOVES:
+        return pictures
     if len(entries) > 3:
         add("family", "The newest in front of its family", f"{one}, fused, and where 95 of 100 further ones would run "
             "at each instant.", draw.family_figure(newest, entries[:-1], "newest against the past"))  # fmt: skip
@@ -144,13 +147,6 @@ def _ink(ax) -> None:
     for words in (ax.title, ax._left_title, ax.xaxis.label, ax.yaxis.label, *(legend.get_texts() if legend else ())):
         words.set_color(_INK)
     ax.xaxis.get_offset_text().set_color(_INK)
-
-
-def _entry_record(e: Entry) -> dict:
-    return {
-        "event": e.event, "kind": e.kind, "date": e.date, "revision": e.revision, "doubts": list(e.doubts),
-        "values": [{"figure": v.figure, "value": v.value, "sigma": v.sigma, "unit": v.unit} for v in e.values],
-    }  # fmt: skip
 
 
 def _template():

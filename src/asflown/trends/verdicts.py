@@ -42,6 +42,8 @@ HORIZON_YEARS = 5.0
 _CYCLES_WATCHED = 0.8
 ORDER = ("pass", "watch", "alarm")
 SHAPE = "shape of the torque"
+#: Kinds of actuation; entries of other kinds (wheels) have neither rests that matter nor cycles.
+MOVES = ("deploy", "stow")
 
 
 @dataclass(frozen=True)
@@ -186,7 +188,9 @@ def _figures_of(entries: list[Entry]) -> list[tuple[str, str]]:
 
 def _judged(f: FigureHealth) -> bool:
     declared = FIGURES.get(f.figure)
-    return f.basis in ("fused", "telemetry") and (declared is None or declared.judged)
+    if declared is None:  # a wheel's drag, or a user's: those with an uncertainty, not counts
+        return f.basis in ("fused", "telemetry") and any(r.sigma is not None for r in f.rows)
+    return f.basis in ("fused", "telemetry") and declared.judged
 
 
 def _figure(entries: list[Entry], name: str, basis: str) -> FigureHealth:
@@ -217,7 +221,7 @@ def _judge_figure(f: FigureHealth, trend_p, newest_p, limit) -> FigureHealth:
     name = f.figure
     n = f.newest
     if n is not None and newest_p is not None and newest_p < WATCH:
-        off = f" ({100 * (n.value / n.expected - 1):+.0f} %)" if n.expected else ""
+        off = f" ({100 * (n.value / n.expected - 1):+.1f} %)" if n.expected else ""
         how = "out of line with" if newest_p < ALARM else "unusual beside"
         said.append((
             "alarm" if newest_p < ALARM else "watch",
@@ -296,7 +300,7 @@ def _doubts(entries: list[Entry], figures: list[FigureHealth], pairs: list[Pair]
         said.append(f"with {n} events a sudden change and a slow one are told apart badly")
     if n <= FEWEST_PAST:
         said.append(f"the newest event is not judged: that takes {FEWEST_PAST} before it")
-    if not pairs:
+    if not pairs and entries[-1].kind in MOVES:
         said.append(
             f"no cold and warm pair: none comes after {COLD_DAYS:g} days of rest with another within {WARM_DAYS:g} days of its own last actuation"
         )

@@ -15,8 +15,10 @@ KIND = "wheels"
 _BASIS = "telemetry"
 
 
-def wheel_entry(result: WheelsResult, telemetry: Telemetry, craft: Craft, event_id: str, provenance: dict) -> Entry:
-    """The entry of one record; its date is that of the first sample.
+def wheel_entry(
+    result: WheelsResult, telemetry: Telemetry, craft: Craft, event_id: str | None, provenance: dict
+) -> Entry:
+    """The entry of one record; its date is that of the first sample, and its name too unless ``event_id`` gives one.
 
     Raises BadInput for telemetry without an epoch: what has no date has no place in a trend."""
     if not telemetry.dated:
@@ -27,7 +29,15 @@ def wheel_entry(result: WheelsResult, telemetry: Telemetry, craft: Craft, event_
         )
     values = tuple(v for w in result.wheels for v in _values(w))
     date = utc_label(telemetry.span()[0])
-    return Entry(craft.name, event_id, KIND, date, values=values, doubts=result.doubts, provenance=provenance)
+    return Entry(
+        craft.name,
+        event_id or f"{KIND}-{date[:10]}",
+        KIND,
+        date,
+        values=values,
+        doubts=result.doubts,
+        provenance=provenance,
+    )
 
 
 def _values(w: WheelDrag):
