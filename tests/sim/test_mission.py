@@ -4,18 +4,22 @@ import json
 import tomllib
 from datetime import date
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from asflown.craft.load import load_craft
 from asflown.kit.errors import BadInput
+from asflown.sim import mission
 from asflown.sim.cover import momentum_per_rate, moving_part
 from asflown.sim.fly import fly
 from asflown.sim.fly_mission import fly_mission, line_at, plan_mission
 from asflown.sim.mission import is_mission, load_mission, shipped_missions
 from asflown.sim.scenario import load_scenario
 from asflown.trends.events import load_events
+
+SHIPPED = Path(mission.__file__).parent / "missions" / "cassini-mission.toml"
 
 #: 000 Tables 1, 2 and B1: (kind, date) -> printed days since the last chronological actuation.
 PRINTED = {
@@ -257,9 +261,8 @@ def test_missions_are_told_from_scenarios(mission, tmp_path):
     assert (
         shipped_missions() == ["cassini-mission"] and is_mission("cassini-mission") and not is_mission("cover-deploy")
     )
-    from asflown.sim.mission import _shipped
 
-    (tmp_path / "mine.toml").write_text((_shipped() / "cassini-mission.toml").read_text())
+    (tmp_path / "mine.toml").write_text(SHIPPED.read_text())
     assert is_mission(tmp_path / "mine.toml") and load_mission(tmp_path / "mine.toml").events == mission.events
     (tmp_path / "flight.toml").write_text('duration = "60 s"\n')
     (tmp_path / "junk.toml").write_text("= [")
@@ -274,9 +277,8 @@ def test_the_command_flies_a_mission(mission, tmp_path):
     from typer.testing import CliRunner
 
     from asflown.cli.simulate import simulate
-    from asflown.sim.mission import _shipped
 
-    text = (_shipped() / "cassini-mission.toml").read_text()
+    text = SHIPPED.read_text()
     head, *events = text.split("[[events]]\n")
     kept = [
         e if "2015-09-29" in e else e.replace('"\nnote', '"\nflown = false\nnote') for e in events if "flown" not in e

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import tomllib
-from importlib import resources
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Literal
@@ -15,10 +14,11 @@ import numpy as np
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
 from ..craft.model import Kilogram, NewtonMetre, RadianPerSecond, Second, _in
-from ..kit.config import read_bytes, toml_table, validated
+from ..kit.config import validated
 from ..kit.errors import BadInput, some_of
 from ..kit.timeline import NS, utc_to_tai_ns
-from .scenario import NoiseName, _merged, _Part
+from .plans import merged, read_plan, shipped
+from .scenario import NoiseName, _Part
 
 Kind = Literal["deploy", "stow"]
 _REMEDY = "See docs/simulator.md, Missions, for the keys; every value carries its unit."
@@ -187,7 +187,7 @@ class Mission(_Part):
         """Another mission; values as in the TOML: ``seed=4``, ``scatter={"impulse_percent": 0.0}``.
 
         Tables are merged key by key, lists replaced.  Raises BadInput as ``load_mission`` does."""
-        return _checked(_merged(self._written, changes), self.name or "mission", self._folder)
+        return _checked(merged(self._written, changes), self.name or "mission", self._folder)
 
 
 def _checked(written: dict, where: str, folder: Path) -> Mission:
@@ -196,13 +196,9 @@ def _checked(written: dict, where: str, folder: Path) -> Mission:
     return mission
 
 
-def _shipped():
-    return resources.files("asflown.sim") / "missions"
-
-
 def shipped_missions() -> list[str]:
     """Names that ``load_mission`` and ``fly_mission`` take without a file."""
-    return sorted(p.name.removesuffix(".toml") for p in _shipped().iterdir() if p.name.endswith(".toml"))
+    return shipped("mission")
 
 
 def is_mission(name_or_path: str | Path) -> bool:
@@ -222,15 +218,4 @@ def load_mission(name_or_path: str | Path) -> Mission:
     """A shipped mission by name, or one from a TOML file.
 
     Raises BadInput for an unknown name, an unreadable file, an unknown key or a wrong unit."""
-    text, path = str(name_or_path), Path(name_or_path)
-    if path.suffix == ".toml" or "/" in text:
-        remedy = f"Give a TOML file, or a shipped mission: {some_of(shipped_missions())}."
-        source, folder, name = read_bytes(path, "mission file", remedy), path.parent, path.name
-    else:
-        if text not in shipped_missions():
-            raise BadInput(
-                f"no mission is named {text!r}",
-                remedy=f"Shipped: {some_of(shipped_missions())}. For your own, give the path of a TOML file.",
-            )
-        source, folder, name = (_shipped() / f"{text}.toml").read_bytes(), Path(), text
-    return _checked({"name": path.stem} | toml_table(source, name), name, folder)
+    return _checked(*read_plan(name_or_path, "mission"))

@@ -6,7 +6,6 @@ Times count from the epoch, at which recording starts.  docs/simulator.md lists 
 from __future__ import annotations
 
 import re
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
@@ -14,11 +13,12 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, model_validator
 
 from ..craft.model import Direction, InertiaElements, Kilogram, Metre, NewtonMetre, Radian, RadianPerSecond, Second, _in
-from ..kit.config import read_bytes, toml_table, validated
-from ..kit.errors import BadInput, some_of
+from ..kit.config import validated
+from ..kit.errors import BadInput
 from ..kit.quantities import numbers, quantity
 from ..kit.timeline import utc_to_tai_ns
 from ..telemetry.channels import AXES, kind_of
+from .plans import merged, read_plan, shipped
 
 NoiseName = Literal["none", "half", "nominal", "double"]
 
@@ -303,15 +303,7 @@ class Scenario(_Part):
         """Another scenario; values as in the TOML: ``duration="60 s"``, ``controller={"delay_cycles": 1}``.
 
         Tables are merged key by key, lists replaced.  Raises BadInput as ``load_scenario`` does."""
-        return _checked(_merged(self._written, changes), self.name or "scenario", self._folder)
-
-
-def _merged(old: dict, new: dict) -> dict:
-    both = dict(old)
-    for key, value in new.items():
-        deep = isinstance(value, dict) and isinstance(both.get(key), dict)
-        both[key] = _merged(both[key], value) if deep else value
-    return both
+        return _checked(merged(self._written, changes), self.name or "scenario", self._folder)
 
 
 def _checked(written: dict, where: str, folder: Path) -> Scenario:
@@ -321,32 +313,16 @@ def _checked(written: dict, where: str, folder: Path) -> Scenario:
     return scenario
 
 
-def _shipped():
-    return resources.files("asflown.sim") / "scenarios"
-
-
 def shipped_scenarios() -> list[str]:
     """Names that ``load_scenario`` and ``fly`` take without a file."""
-    return sorted(p.name.removesuffix(".toml") for p in _shipped().iterdir() if p.name.endswith(".toml"))
+    return shipped("scenario")
 
 
 def load_scenario(name_or_path: str | Path) -> Scenario:
     """A shipped scenario by name, or one from a TOML file.
 
     Raises BadInput for an unknown name, an unreadable file, an unknown key or a wrong unit."""
-    text, path = str(name_or_path), Path(name_or_path)
-    if path.suffix == ".toml" or "/" in text:
-        remedy = f"Give a TOML file, or a shipped scenario: {some_of(shipped_scenarios())}."
-        source, folder, name = read_bytes(path, "scenario file", remedy), path.parent, path.name
-    else:
-        if text not in shipped_scenarios():
-            raise BadInput(
-                f"no scenario is named {text!r}",
-                remedy=f"Shipped: {some_of(shipped_scenarios())}. For your own, give the path of a TOML file.",
-            )
-        source, folder, name = (_shipped() / f"{text}.toml").read_bytes(), Path(), text
-    written = toml_table(source, name)
-    return _checked({"name": path.stem} | written, name, folder)
+    return _checked(*read_plan(name_or_path, "scenario"))
 
 
 def axis_number(axis: str) -> int:
