@@ -458,10 +458,12 @@ def _print_two(record: dict) -> None:
 
 
 def _doubts_by_event(entries) -> dict[str, str]:
-    """Every doubt once, with how many events have it."""
+    """Every doubt once, the events' own dates left out, with how many events have it."""
+    import re
+
     found: dict[str, list[str]] = {}
     for e in entries:
-        for d in e.doubts:
+        for d in (re.sub(r" on \d{4}-\d\d-\d\d", "", d) for d in e.doubts):
             found.setdefault(d, []).append(e.event)
     return {d: names[0] if len(names) == 1 else f"{len(names)} events" for d, names in found.items()}
 
