@@ -10,7 +10,7 @@ from ..trends.curves import TORQUE, family_band, instants
 from ..trends.entry import Entry
 from ..trends.figures import FIRST_PHASE_S
 from ..trends.pairs import Pair
-from ..trends.slope import FEWEST
+from ..trends.slope import FEWEST, YEAR
 from ..trends.verdicts import FigureHealth
 from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, new_figure
 
@@ -45,7 +45,10 @@ def trend_figure(first: FigureHealth, *others: FigureHealth, title: str | None =
         )
     t = first.trend
     if t is not None and len(first.rows) >= FEWEST:
-        days = np.linspace(t.values.day[0], t.values.day[-1] + 0.1 * np.ptp(t.values.day), 100)
+        end = t.values.day[-1] + 0.1 * np.ptp(t.values.day)
+        if first.limit_reached[0] is not None:  # far enough to see it happen
+            end = max(end, min(first.limit_reached[0] + YEAR, t.values.day[-1] + 10 * YEAR))
+        days = np.linspace(t.values.day[0], end, 100)
         when = [datetime(2000, 1, 1) + timedelta(days=d) for d in days]
         low, high = t.band(days)
         ax.plot(when, scale * t.at(days), color=BLUE, lw=1.3)

@@ -172,6 +172,8 @@ def _quantity(value, sigma, unit: str) -> str:
     if value is None:
         return "not known"
     scale, shown = draw.DRAWN_IN.get(unit, (1.0, unit))
+    if shown.startswith("N") and 0 < abs(scale * value) < 1e-3:
+        scale, shown = 1e6 * scale, f"µ{shown}"
     if not sigma:
         return f"{scale * value:.4g} {shown}".strip()
     digits = max(0, 1 - int(np.floor(np.log10(scale * sigma))))
