@@ -61,6 +61,10 @@ def test_add_keeps_and_says_what(flown):
     assert kept.provenance["inputs"][0]["sha256"] and kept.provenance["versions"]["asflown"]
     listed = run("trend", "list", "--store", folder / "t.db", "--json").record
     assert [(e["event"], e["days_since_last"]) for e in listed["events"]] == [("before", None), ("one", 77)]
+    with_value = run("trend", "list", "--store", folder / "t.db", "--figure", "angular_impulse", "--json").record[
+        "events"
+    ]
+    assert with_value[0]["value"] is None and with_value[1]["value"] < -0.2
 
 
 def test_show_has_the_keys_that_were_promised(store):
@@ -122,6 +126,7 @@ def test_report_writes_a_page_and_its_twin(store, tmp_path):
     [
         (("trend", "show", "--store", "missing.db"), "no trend store"),
         (("trend", "show", "--store", "STORE", "--figure", "speed"), "no figure 'speed'"),
+        (("trend", "list", "--store", "STORE", "--figure", "speed"), "no figure 'speed'"),
         (("trend", "show", "--store", "STORE", "--kind", "slew"), "holds no slew"),
         (("trend", "show", "--store", "STORE", "--craft", "iss"), "holds nothing of 'iss'"),
         (("trend", "show", "--store", "STORE", "--limit", "angular_impulse=3"), "no unit"),

@@ -122,6 +122,19 @@ def test_recovery_a_sudden_change_raises_an_alarm_with_the_reason():
     assert not any("out of line" in r for r in before.reasons)
 
 
+def test_recovery_a_sudden_change_that_stays_is_said_beside_the_slope():
+    from asflown.trends.record import sudden_words
+
+    late = [
+        replace(e, values=tuple(replace(v, value=1.3 * v.value) for v in e.values)) if e.date > "2010" else e
+        for e in history(scatter=0.02, seed=6)
+    ]
+    f = judge(late).figure("angular_impulse")
+    assert f.rows[f.step.before].event == "deploy-2009-10-31"
+    assert f.step.percent == pytest.approx(30, abs=3) and "rather a sudden change" in sudden_words(f)
+    assert sudden_words(judge(history(change=0.3, scatter=0.01, seed=6)).figure("angular_impulse")) is None
+
+
 def test_law_limits_are_watched_and_then_alarm():
     entries = history(change=0.4, seed=2)
     assert judge(entries, limits={"angular_impulse": -0.30}).verdict == "alarm"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from .options import CHANNELS, CRAFT, JSON, craft_from, hashes
+from .options import CHANNELS, CM, CRAFT, INERTIA, JSON, craft_from, hashes
 from .output import print_doubts, print_json, provenance, say, wrapped
 
 app = typer.Typer(
@@ -31,6 +31,8 @@ def add(
     ),
     store: str = STORE,
     craft: str = CRAFT,
+    inertia: str = INERTIA,
+    cm: str = CM,
     channels: Path = CHANNELS,
     figures: Path = FIGURES,
     only: str = typer.Option(None, "--only", help="Ids of some events of the list, divided by commas."),
@@ -42,11 +44,11 @@ def add(
 
     from asflown.trends.store import TrendStore
 
-    ship = craft_from(craft, None, None)
+    ship = craft_from(craft, inertia, cm)
     chosen, inputs = _events(events, ship, channels, only)
     TrendStore.open(store).close()  # a store that cannot be written should say so before the work
     entries = analysed(chosen, ship, channels, figures, jobs)
-    options = {"craft": craft, "channels": channels, "figures": figures, "only": only}
+    options = {"craft": craft, "inertia": inertia, "cm": cm, "channels": channels, "figures": figures, "only": only}
     origin = provenance(inputs | hashes(craft, channels, figures), options)
     kept_with = {
         "versions": origin["versions"],
@@ -75,17 +77,22 @@ def add(
 
 
 @app.command("list", short_help="Events in the store, with rests and cycles.")
-def list_(store: str = STORE, craft: str = WHOSE, json: bool = JSON) -> None:
+def list_(store: str = STORE, figure: str = FIGURE, basis: str = BASIS, craft: str = WHOSE, json: bool = JSON) -> None:
     """Events in the store in order of date, with days since the last actuation and cycles used, both from the dates."""
+    from asflown.kit.errors import BadInput, some_of
     from asflown.trends.pairs import cycles, rests, whole_days
 
     entries, name = _entries(store, craft, curves=False)
+    known = {v.figure for e in entries for v in e.values}
+    if figure is not None and figure not in known:
+        raise BadInput(f"the store holds no figure {figure!r}", remedy=f"It holds: {some_of(sorted(known))}.")
     moves = [e for e in entries if e.kind in ("deploy", "stow")]
     rest = rests(moves)
     rows = [
         {"event": e.event, "kind": e.kind, "date": e.date, "revision": e.revision, "motor": e.motor,
          "days_since_last": whole_days(rest[e.event]) if e.event in rest else None,
-         "figures": sum(v.value is not None for v in e.values), "doubts": list(e.doubts)} for e in entries
+         "figures": sum(v.value is not None for v in e.values), "doubts": list(e.doubts)}
+        | ({} if figure is None else {"value": _value_of(e, figure, basis), "figure": figure}) for e in entries
     ]  # fmt: skip
     if json:
         print_json({
@@ -99,6 +106,7 @@ def list_(store: str = STORE, craft: str = WHOSE, json: bool = JSON) -> None:
         since = "" if r["days_since_last"] is None else str(r["days_since_last"])
         print(
             f"  {r['event']:24s} {r['date'][:10]} {r['kind']:7s} {since:>15s} {r['revision']:8d} {r['figures'] or '':>7}"
+            + ("" if r.get("value") is None else f"  {r['value']:+.4g}")
         )
 
 
@@ -389,8 +397,14 @@ def _two(health, first: str, second: str) -> dict:
 
 
 def _print_figure(f, rows: bool) -> None:
+    from asflown.trends.record import sudden_words
+
     t = f.trend
-    print(f"{f.figure} · {f.basis} · [{f.unit or '1'}] · {f.verdict}")
+    newest = ""
+    if f.rows:
+        last = f.rows[-1]
+        newest = f"{last.value:+.4g}" + ("" if last.sigma is None else f" +- {last.sigma:.2g}") + f" {f.unit}".rstrip()
+    print(f"{f.figure} · {f.basis} · {newest} · {f.verdict}")
     if rows:
         for r in f.rows:
             print(f"  {r.event:24s} {r.date[:10]}  {r.value:+.4g}" + ("" if r.sigma is None else f" +- {r.sigma:.2g}"))
@@ -404,6 +418,8 @@ def _print_figure(f, rows: bool) -> None:
         "" if f.trend_p_adjusted is None else f" ({f.trend_p_adjusted:.2g} for all figures)"))  # fmt: skip
     if t.detectable_percent is not None:
         print(f"  a change of {t.detectable_percent:.0f} % would have been seen in 8 of 10 such histories")
+    if (sudden := sudden_words(f)) is not None:
+        print(wrapped("  ", sudden))
     for reason in f.reasons:
         print(wrapped("  ", reason))
 
@@ -455,6 +471,13 @@ def _print_two(record: dict) -> None:
         )
     if record["curve_distance"] is not None:
         print(f"  curves, registered: rms difference {100 * record['curve_distance']:.0f} % of their size")
+
+
+def _value_of(entry, figure: str, basis: str | None) -> float | None:
+    for b in (basis,) if basis else ("fused", "telemetry"):
+        if (v := entry.value(figure, b)) is not None:
+            return v.value
+    return None
 
 
 def _doubts_by_event(entries) -> dict[str, str]:

@@ -18,7 +18,7 @@ from ..kit.files import write_text
 from ..kit.plain import plain
 from ..plots import trend as draw
 from ..plots.figure import BLUE, GREY, save_svg
-from ..trends.record import health_record
+from ..trends.record import health_record, sudden_words
 from ..trends.verdicts import MOVES, FigureHealth, Health
 
 #: Ink in which the pictures are drawn, to be replaced by the page's.
@@ -108,7 +108,8 @@ def _trend_words(f: FigureHealth) -> str:
         said = f"Change over the years {t.change_percent:+.0f} % (95 %: {low:+.0f} to {high:+.0f} %), {said}"
     if t.detectable_percent is not None:
         said += f"; a change of {t.detectable_percent:.0f} % would have been seen in 8 of 10 such histories"
-    return said + "."
+    sudden = sudden_words(f)
+    return said + "." + ("" if sudden is None else f" {sudden[0].upper()}{sudden[1:]}.")
 
 
 def _svg(figure, name: str) -> str:

@@ -38,6 +38,17 @@ def figure_record(f: FigureHealth) -> dict:
     }
 
 
+def sudden_words(f: FigureHealth) -> str | None:
+    """A sentence on a sudden change, where one is seen and describes the history better than a slope."""
+    s = f.step
+    if s is None or s.p_value >= 0.05 or s.rather_than_slope <= 0 or s.percent is None:
+        return None
+    return (
+        f"rather a sudden change of {s.percent:+.0f} % after {f.rows[s.before].event} than a slope "
+        f"(log likelihood {s.rather_than_slope:.1f} higher; p = {s.p_value:.2g} against no change)"
+    )
+
+
 def newest_record(n: Newest, adjusted: float | None) -> dict:
     return {
         "value": n.value, "expected": n.expected, "low_95": n.low, "high_95": n.high, "p_value": n.p_value,

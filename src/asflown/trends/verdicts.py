@@ -295,7 +295,7 @@ def _doubts(entries: list[Entry], figures: list[FigureHealth], pairs: list[Pair]
     said = []
     n = len(entries)
     if n < FEWEST:
-        said.append(f"{n} events are too few for a trend's interval: it takes {FEWEST}")
+        said.append(f"{n} event{'s are' if n > 1 else ' is'} too few for a trend's interval: it takes {FEWEST}")
     elif n <= FEW:
         said.append(f"with {n} events a sudden change and a slow one are told apart badly")
     if n <= FEWEST_PAST:
