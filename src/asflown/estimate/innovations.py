@@ -11,8 +11,6 @@ from .latent import ROWS
 
 #: A channel is not explained when neighbours correlate this much, and chance would do so this rarely.
 _CORRELATED, _CHANCE = 0.35, 1e-3
-#: The words of a doubt that says so.
-UNEXPLAINED = "the model does not explain"
 #: A quantity taken as known is doubted when the data put it this far off, in units of its own sigma.
 _FAR_OFF = 2.5
 
@@ -45,7 +43,7 @@ def by_channel(whitened: np.ndarray, row: np.ndarray) -> dict[str, Innovations]:
 
 def innovation_doubts(axis: str, found: dict[str, Innovations]) -> list[str]:
     return [
-        f"{UNEXPLAINED} {channel} about {axis} (its innovations follow each other, correlation "
+        f"the model does not explain {channel} about {axis} (its innovations follow each other, correlation "
         f"{i.correlation:+.2f}): inertia, gains, a commanded motion or a thruster firing in the span?"
         for channel, i in found.items()
         if abs(i.correlation) > _CORRELATED and i.p < _CHANCE

@@ -26,7 +26,7 @@ from ..kit.smoother import Measurements, smooth
 from ..telemetry.channels import AXES
 from .corners import COARSEST_S, draw_torques, spacing_s
 from .curves import gaussian_torque, widened
-from .innovations import UNEXPLAINED, Innovations, by_channel, considered_doubts, innovation_doubts
+from .innovations import Innovations, by_channel, considered_doubts, innovation_doubts
 from .latent import Body, Times, arrange, channel_of, without_known
 from .latent_free import FreeBody
 from .latent_loop import HeldBody
@@ -127,11 +127,13 @@ def fused(
         doubts += s.doubts
     unexplained = [d for a, s in solved.items() for d in innovation_doubts(a, s.innovations)]
     if unexplained and loop is None and record.loop == "modelled":
-        *answer, others, drawn = fused(subject, prior, axes, "measured", considered, seed)
-        if sum(UNEXPLAINED in d for d in others) < len(unexplained):
+        *answer, other_settings, others, drawn = fused(subject, prior, axes, "measured", considered, seed)
+        if other_settings["unexplained_channels"] < len(unexplained):
             instead = f"the loop as the craft file describes it is not used, the actuators' action is taken as measured: {unexplained[0]}"
-            return (*answer, [instead, *others], drawn)
-    settings = {"prior": prior, "loop": record.loop, "seed": seed} | _settings(solved)
+            return (*answer, other_settings, [instead, *others], drawn)
+    settings = {
+        "prior": prior, "loop": record.loop, "seed": seed, "unexplained_channels": len(unexplained), **_settings(solved)
+    }  # fmt: skip
     return record.grid, torque, sigma, momentum, settings, doubts, paths
 
 
