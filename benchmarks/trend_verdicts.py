@@ -128,10 +128,9 @@ def campaign(pool, runs: int) -> dict:
 
 def flown(seed: int) -> dict:
     """A mission flown in the closed loop, analysed from its telemetry and judged; the truth beside the answer."""
+    from asflown.craft.load import load_craft
     from asflown.sim.fly_mission import fly_mission
     from asflown.sim.mission import load_mission
-
-    from asflown.craft.load import load_craft
     from asflown.trends.analyse import analyse
     from asflown.trends.events import load_events
 

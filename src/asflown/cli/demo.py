@@ -154,10 +154,12 @@ def _mission(out: Path) -> dict:
     from asflown.craft.load import load_craft
     from asflown.report.page import write_report
     from asflown.sim.fly_mission import fly_mission
+    from asflown.trends.board import healths_in
     from asflown.trends.events import load_events
+    from asflown.trends.record import figure_record
     from asflown.trends.store import TrendStore
 
-    from .trend import analysed, health_of
+    from .trend import analysed
 
     say("a mission of 20 actuations: flying")
     truth = fly_mission("cassini-mission", out, seed=SEED)
@@ -166,15 +168,14 @@ def _mission(out: Path) -> dict:
     with TrendStore.open(store) as trends:
         trends.add(entries)
     say("judging and drawing")
-    healths = health_of(str(store), None, [])
+    healths = healths_in(str(store), None, [])
     page = out / "report.html"
     write_report(healths, page, plain(provenance({}, {"store": str(store)}, SEED)))
     deploys = healths[0]
     wanted = {name.rpartition("_N")[0]: v for name, v in truth["law"]["change_percent"].items()}
-    changes = [
-        {"figure": name, "flown_percent": wanted[name], "change_percent": (t := deploys.figure(name).trend).change_percent,
-         "change_percent_ci95": list(t.change_percent_ci95)} for name in wanted
-    ]  # fmt: skip
+    found = {f["figure"]: f for f in map(figure_record, deploys.figures) if f["basis"] == "fused"}
+    keys = ("figure", "change_percent", "change_percent_ci95")
+    changes = [{"flown_percent": v} | {k: found[name][k] for k in keys} for name, v in wanted.items()]
     return {
         "changes": changes, "verdict": deploys.verdict, "reasons": list(deploys.reasons), "report": str(page),
         "events": len(entries),

@@ -8,7 +8,7 @@ import typer
 
 from .options import JSON
 from .output import plain, print_json, provenance, say, wrapped
-from .trend import LIMIT, WHOSE, health_of, without_password
+from .trend import LIMIT, WHOSE, without_password
 
 
 def report(
@@ -27,8 +27,9 @@ def report(
     check_place(out)
     check_place(out.with_suffix(".json"))
     from asflown.report.page import write_report
+    from asflown.trends.board import healths_in
 
-    healths = health_of(store, craft, limit)
+    healths = healths_in(store, craft, limit)
     origin = provenance({}, {"store": without_password(store), "craft": craft, "limit": list(limit)})
     twin, record = write_report(healths, out, plain(origin))
     if json:

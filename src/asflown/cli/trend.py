@@ -8,6 +8,7 @@ import typer
 
 from .options import CHANNELS, CM, CRAFT, INERTIA, JSON, craft_from, hashes
 from .output import print_doubts, print_json, provenance, say, wrapped
+from .trend_tables import doubts_by_event, print_cold_warm, print_figure, print_newest, print_two, value_of
 
 app = typer.Typer(
     help="Figures of merit of an actuator over years: keep, show, compare, watch.",
@@ -71,7 +72,7 @@ def add(
     for e in added:
         kept = f"{sum(v.value is not None for v in e.values):3d} figures" if e.values else "its date only"
         print(f"  {e.event:24s} {e.date[:10]}  revision {e.revision}  {kept}")
-    for doubt, names in _doubts_by_event(added).items():
+    for doubt, names in doubts_by_event(added).items():
         print(wrapped("  DOUBT  ", f"{doubt} ({names})"))
     print(f"{len(added)} events kept in {without_password(store)}")
 
@@ -80,19 +81,20 @@ def add(
 def list_(store: str = STORE, figure: str = FIGURE, basis: str = BASIS, craft: str = WHOSE, json: bool = JSON) -> None:
     """Events in the store in order of date, with days since the last actuation and cycles used, both from the dates."""
     from asflown.kit.errors import BadInput, some_of
+    from asflown.trends.board import entries_in
     from asflown.trends.pairs import cycles, rests, whole_days
 
-    entries, name = _entries(store, craft, curves=False)
+    entries, name = entries_in(store, craft, curves=False)
     known = {v.figure for e in entries for v in e.values}
     if figure is not None and figure not in known:
         raise BadInput(f"the store holds no figure {figure!r}", remedy=f"It holds: {some_of(sorted(known))}.")
     moves = [e for e in entries if e.kind in ("deploy", "stow")]
     rest = rests(moves)
-    rows = [
+    rows: list[dict] = [
         {"event": e.event, "kind": e.kind, "date": e.date, "revision": e.revision, "motor": e.motor,
          "days_since_last": whole_days(rest[e.event]) if e.event in rest else None,
          "figures": sum(v.value is not None for v in e.values), "doubts": list(e.doubts)}
-        | ({} if figure is None else {"value": _value_of(e, figure, basis), "figure": figure}) for e in entries
+        | ({} if figure is None else {"value": value_of(e, figure, basis), "figure": figure}) for e in entries
     ]  # fmt: skip
     if json:
         print_json({
@@ -122,9 +124,10 @@ def show(
     json: bool = JSON,
 ) -> None:
     """A figure over the years: robust slope and change with intervals, permutation p-value, what would have been seen."""
+    from asflown.trends.board import health_in
     from asflown.trends.record import figure_record
 
-    health = _health(store, craft, kind, limit)
+    health = health_in(store, craft, kind, limit)
     found = (
         [health.figure(figure, basis)]
         if figure
@@ -145,7 +148,7 @@ def show(
         })  # fmt: skip
         return
     for f in found:
-        _print_figure(f, rows=figure is not None)
+        print_figure(f, rows=figure is not None)
     print_doubts(health.doubts)
 
 
@@ -162,12 +165,13 @@ def compare(
 ) -> None:
     """Cold actuations against the warm ones after them: certainly no more different than a margin?"""
     from asflown.kit.errors import BadInput
-    from asflown.trends.record import cold_warm_record
+    from asflown.trends.board import health_in
+    from asflown.trends.record import cold_warm_record, two_record
 
     if (first is None) != (second is None):
         raise BadInput("one event alone cannot be compared", remedy="Name two, or none for cold against warm.")
-    health = _health(store, craft, kind, [], margin=margin / 100)
-    record = cold_warm_record(health) if first is None else _two(health, first, second)
+    health = health_in(store, craft, kind, [], margin=margin / 100)
+    record = cold_warm_record(health) if first is None else two_record(health, first, second)
     if figure is not None:
         health.figure(figure)
         for key in ("equivalence", "figures"):
@@ -179,7 +183,7 @@ def compare(
             "provenance": provenance({}, {"store": without_password(store), "margin_percent": margin, "figure": figure}),
         })  # fmt: skip
         return
-    _print_two(record) if first else _print_cold_warm(record)
+    print_two(record) if first else print_cold_warm(record)
     print_doubts(health.doubts)
 
 
@@ -194,10 +198,11 @@ def watch(
     json: bool = JSON,
 ) -> None:
     """Judge the newest actuation against the family of the past ones: pass, watch or alarm, and why.  Exit 3 on alarm."""
+    from asflown.trends.board import health_in
     from asflown.trends.record import figure_record, health_record
     from asflown.trends.verdicts import ORDER
 
-    health = _health(store, craft, kind, limit, until=event)
+    health = health_in(store, craft, kind, limit, until=event)
     verdict, reasons = health.verdict, list(health.reasons)
     figures = [f for f in health.figures if f.newest is not None and f.basis in ("fused", "telemetry")]
     if figure is not None:
@@ -215,7 +220,7 @@ def watch(
         print(f"{verdict.upper()}: {health.craft}, {kind}, {health.entries[-1].event}")
         for r in reasons:
             print(wrapped("  ", r))
-        _print_newest(health, figures)
+        print_newest(health, figures)
         print_doubts(health.doubts)
     if verdict == ORDER[-1]:
         raise typer.Exit(3)
@@ -279,216 +284,6 @@ def _one(event, ship, channels, figures):
         load_figures(figures)
     telemetry = None if event.file is None else load_telemetry(event.file, channels=channels, craft=ship)
     return analyse(event, ship, telemetry)
-
-
-def _entries(store: str, craft: str | None, curves: bool):
-    """All latest entries of the one craft asked for, and its name."""
-    from asflown.kit.errors import BadInput, some_of
-    from asflown.trends.store import TrendStore
-
-    with TrendStore.open(store, create=False) as trends:
-        crafts = trends.crafts()
-        if craft is not None:
-            craft = Path(craft).stem if craft.endswith(".toml") else craft
-        if not crafts or (craft is not None and craft not in crafts):
-            what = "is empty" if not crafts else f"holds nothing of {craft!r}"
-            raise BadInput(f"the store {what}", file=without_password(store),
-                           remedy=f"Crafts it holds: {some_of(crafts)}. `asflown trend add` fills it.")  # fmt: skip
-        if craft is None and len(crafts) > 1:
-            raise BadInput(f"the store holds several crafts: {some_of(crafts)}", file=without_password(store),
-                           remedy="Choose one with --craft.")  # fmt: skip
-        name = craft or crafts[0]
-        return trends.entries(name, curves=curves), name
-
-
-def health_of(store: str, craft: str | None, limits: list[str]):
-    """Verdicts over every kind in the store that has figures: deploys, stows, wheels."""
-    from asflown.kit.errors import BadInput
-    from asflown.trends.verdicts import MOVES, judge
-
-    entries, name = _entries(store, craft, curves=True)
-    kinds = [k for k in (*MOVES, "wheels") if any(e.kind == k and e.values for e in entries)]
-    if not kinds:
-        raise BadInput("the store holds nothing with figures of merit", file=without_password(store),
-                       remedy="`asflown trend add` and `asflown wheels --store` fill it.")  # fmt: skip
-    allowed, limit = _cycles_allowed(name, entries), _limits(limits, entries)
-    return [
-        judge(_of(kind, entries), kind=kind, cycles_allowed=_if_moved(kind, allowed), limits=limit) for kind in kinds
-    ]
-
-
-def _of(kind: str, entries):
-    """Entries that count for a kind: all actuations, for rests and cycles; or that kind alone."""
-    from asflown.trends.verdicts import MOVES
-
-    return (
-        [e for e in entries if e.kind in MOVES or e.kind == kind]
-        if kind in MOVES
-        else [e for e in entries if e.kind == kind]
-    )
-
-
-def _if_moved(kind: str, allowed: int | None) -> int | None:
-    from asflown.trends.verdicts import MOVES
-
-    return allowed if kind in MOVES else None
-
-
-def _health(store: str, craft: str | None, kind: str, limits: list[str], **options):
-    """The verdict over everything the store holds of one kind."""
-    from asflown.trends.verdicts import judge
-
-    entries, name = _entries(store, craft, curves=True)
-    return judge(
-        entries, kind=kind, cycles_allowed=_cycles_allowed(name, entries), limits=_limits(limits, entries), **options
-    )
-
-
-def _cycles_allowed(name: str, entries) -> int | None:
-    """Of the mechanism that the entries are of, where the craft is a built-in one."""
-    from asflown.craft.load import built_in_crafts, load_craft
-
-    moved = {e.provenance.get("mechanism") for e in entries} - {None}
-    if name not in built_in_crafts() or len(moved) != 1:
-        return None
-    return load_craft(name).mechanism(moved.pop()).cycles_allowed
-
-
-def _limits(texts: list[str], entries) -> dict[str, float]:
-    """'angular_impulse=-0.5 N m s' -> SI by figure, the unit checked against the figure's."""
-    from asflown.kit.errors import BadInput, some_of
-    from asflown.kit.quantities import quantity
-
-    units = {v.figure: v.unit for e in entries for v in e.values}
-    found = {}
-    for text in texts:
-        name, equals, value = text.partition("=")
-        if not equals or name.strip() not in units:
-            raise BadInput(f"--limit {text!r} does not name a figure of this store",
-                           remedy=f'Write it as in "angular_impulse=-0.5 N m s". Figures: {some_of(units)}.')  # fmt: skip
-        found[name.strip()] = quantity(value.strip(), units[name.strip()])
-    return found
-
-
-def _two(health, first: str, second: str) -> dict:
-    """Two events' figures side by side, and how far apart their curves are."""
-    import numpy as np
-
-    from asflown.kit.errors import BadInput, some_of
-    from asflown.trends.curves import TORQUE, distance
-
-    by_name = {e.event: e for e in health.entries}
-    for name in (first, second):
-        if name not in by_name:
-            raise BadInput(f"no {health.kind} called {name!r} has figures", remedy=f"There are: {some_of(by_name)}.")
-    a, b = by_name[first], by_name[second]
-    rows = []
-    for v in a.values:
-        w = b.value(v.figure, v.basis)
-        if v.basis in ("fused", "telemetry") and w is not None and None not in (v.value, w.value):
-            sigma = None if None in (v.sigma, w.sigma) else float(np.hypot(v.sigma, w.sigma))
-            rows.append({
-                "figure": v.figure, "unit": v.unit, "first": v.value, "second": w.value,
-                "difference": w.value - v.value, "sigma_difference": sigma,
-            })  # fmt: skip
-    curves = a.curve(TORQUE), b.curve(TORQUE)
-    apart = None if None in curves else distance(*curves)
-    return {"first": first, "second": second, "figures": rows, "curve_distance": apart}
-
-
-def _print_figure(f, rows: bool) -> None:
-    from asflown.trends.record import sudden_words
-
-    t = f.trend
-    newest = ""
-    if f.rows:
-        last = f.rows[-1]
-        newest = f"{last.value:+.4g}" + ("" if last.sigma is None else f" +- {last.sigma:.2g}") + f" {f.unit}".rstrip()
-    print(f"{f.figure} · {f.basis} · {newest} · {f.verdict}")
-    if rows:
-        for r in f.rows:
-            print(f"  {r.event:24s} {r.date[:10]}  {r.value:+.4g}" + ("" if r.sigma is None else f" +- {r.sigma:.2g}"))
-    if t is None:
-        print("  too few events for a trend")
-        return
-    change = "" if t.change_percent is None else f"change {t.change_percent:+.1f} %"
-    if t.change_percent_ci95:
-        change += f" (95 %: {t.change_percent_ci95[0]:+.1f} to {t.change_percent_ci95[1]:+.1f})"
-    print(f"  {change or 'no relative change'}   slope {t.slope_per_year:+.3g} a year   p {t.p_value:.2g}" + (
-        "" if f.trend_p_adjusted is None else f" ({f.trend_p_adjusted:.2g} for all figures)"))  # fmt: skip
-    if t.detectable_percent is not None:
-        print(f"  a change of {t.detectable_percent:.0f} % would have been seen in 8 of 10 such histories")
-    if (sudden := sudden_words(f)) is not None:
-        print(wrapped("  ", sudden))
-    for reason in f.reasons:
-        print(wrapped("  ", reason))
-
-
-def _print_newest(health, figures) -> None:
-    print(
-        f"  {'figure':24s} {'value':>11s} {'expected':>11s} {'95 % from':>11s} {'to':>11s} {'p':>7s} {'all':>7s}  seen from"
-    )
-    for f in figures:
-        n = f.newest
-        if n is None:
-            continue
-        adjusted = "" if f.newest_p_adjusted is None else f"{f.newest_p_adjusted:7.2g}"
-        least = n.detectable()
-        seen = "" if least is None else f"{least:.0f} %"
-        print(
-            f"  {f.figure:24s} {n.value:+11.4g} {n.expected:+11.4g} {n.low:+11.4g} {n.high:+11.4g} {n.p_value:7.2g} {adjusted:>7s}  {seen}"
-        )
-    if health.shape is not None:
-        s = health.shape
-        print(
-            f"  shape of the torque: {s.distance:.2f} from the family, the others usually {s.usual:.2f}; p {s.p_value:.2g}"
-        )
-
-
-def _print_cold_warm(record: dict) -> None:
-    for p in record["pairs"]:
-        print(f"  cold {p['cold']} (after {p['rest_days']} days) · warm {p['warm']}")
-    if record["equivalence"]:
-        print(f"  {'figure':24s} {'warm - cold':>12s} {'90 % interval':>20s} {'p':>8s}   certain within")
-    for e in record["equivalence"]:
-        low, high = e["difference_percent_ci90"]
-        word = f"within {e['margin_percent']:g} %" if e["equivalent"] else f"not shown within {e['margin_percent']:g} %"
-        print(f"  {e['figure']:24s} {e['difference_percent']:+11.1f}% {low:+9.1f} to {high:+6.1f}% {e['p_value']:8.2g}   "
-              f"{e['provable_percent']:.0f} %: {word}")  # fmt: skip
-    c = record["curves"]
-    if c:
-        p = "" if c["p_value"] is None else f"; p = {c['p_value']:.2g} that pairs differ more"
-        print(f"  whole curves: pairs {', '.join(f'{d:.2f}' for d in c['pairs'])}; other neighbours "
-              f"{min(c['others']):.2f} to {max(c['others']):.2f}{p}" if c["others"] else "  whole curves: no other neighbours")  # fmt: skip
-
-
-def _print_two(record: dict) -> None:
-    print(f"  {'figure':24s} {record['first']:>22s} {record['second']:>22s}   difference")
-    for r in record["figures"]:
-        sigma = "" if r["sigma_difference"] is None else f" +- {r['sigma_difference']:.2g}"
-        print(
-            f"  {r['figure']:24s} {r['first']:+22.4g} {r['second']:+22.4g}   {r['difference']:+.3g}{sigma} {r['unit']}"
-        )
-    if record["curve_distance"] is not None:
-        print(f"  curves, registered: rms difference {100 * record['curve_distance']:.0f} % of their size")
-
-
-def _value_of(entry, figure: str, basis: str | None) -> float | None:
-    for b in (basis,) if basis else ("fused", "telemetry"):
-        if (v := entry.value(figure, b)) is not None:
-            return v.value
-    return None
-
-
-def _doubts_by_event(entries) -> dict[str, str]:
-    """Every doubt once, the events' own dates left out, with how many events have it."""
-    import re
-
-    found: dict[str, list[str]] = {}
-    for e in entries:
-        for d in (re.sub(r" on \d{4}-\d\d-\d\d", "", d) for d in e.doubts):
-            found.setdefault(d, []).append(e.event)
-    return {d: names[0] if len(names) == 1 else f"{len(names)} events" for d, names in found.items()}
 
 
 def without_password(store: str) -> str:

@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from ..trends.curves import TORQUE, family_band, instants
+from ..trends.curves import TORQUE, family_band
 from ..trends.entry import Entry
 from ..trends.figures import FIRST_PHASE_S
 from ..trends.pairs import Pair
@@ -89,7 +89,7 @@ def family_figure(newest: Entry, past: list[Entry], title: str):
     c = newest.curve(TORQUE)
     if c is not None:
         ax.plot(c.time_s / 60, 1e3 * c.values, color=RED, lw=1.5, label=newest.event)
-    _torque_axes(ax, title, last_s=instants()[-1])
+    _torque_axes(ax, title, last_s=t[-1] if len(curves) >= 3 else None)
     return figure
 
 

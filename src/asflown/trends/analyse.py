@@ -15,7 +15,7 @@ from ..telemetry.load import load_telemetry
 from ..telemetry.telemetry import Telemetry
 from .entry import Curve, Entry, Value
 from .events import Event
-from .figures import FIGURES, FIRST_PHASE_S, Actuation, Torque, measure
+from .figures import FIGURES, Actuation, Torque, measure
 
 #: Basis -> method and variant of the torque.
 BASES = {
@@ -169,6 +169,3 @@ def _curves(tlm: Telemetry, event: Event, torques: dict[str, Torque], mechanism:
         if found is not None and len(found[0]):
             unit = next(c.kind.unit for c in tlm.channels.values() if c.kind.stem == stem)
             yield Curve(stem, unit, found[0], np.asarray(found[1], float))
-
-
-__all__ = ["BASES", "DEVICES", "FIRST_PHASE_S", "analyse"]

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from .entry import Curve, Entry
+from .entry import Curve
 
-#: The instants curves are compared at, from the motor's start. [s]
-START_S, STOP_S, STEP_S = 0.0, 240.0, 1.0
-#: Largest shift [s] and stretch [share] in registration.
-_SHIFT_S, _STRETCH = 8.0, 0.06
+#: Curves are compared from the motor's start until this share of the median's squares is past, at so many instants.
+_PAST, _INSTANTS = 0.998, 241
+#: Largest shift and stretch in registration, as shares of that span.
+_SHIFT, _STRETCH = 0.04, 0.06
 TORQUE = "torque, fused"
 #: Past curves needed to judge the shape of a new one.
 FEWEST_CURVES = 6
@@ -31,27 +31,23 @@ class Shape:
     p_value: float
 
 
-def sampled(entry: Entry, name: str = TORQUE) -> tuple[np.ndarray, np.ndarray] | None:
-    """(values, sigma) of an entry's curve at the common instants; None where it has none that reaches so far."""
-    curve = entry.curve(name)
-    if curve is None or not len(curve.time_s) or curve.time_s[0] > START_S or curve.time_s[-1] < STOP_S:
-        return None
-    return _at(curve, instants())
+def instants(curves: list[Curve]) -> np.ndarray:
+    """Where curves are compared: from the motor's start until nearly nothing more happens, a tenth longer. [s]"""
+    last = min(float(c.time_s[-1]) for c in curves)
+    t = np.linspace(0.0, last, 4 * _INSTANTS)
+    past = np.cumsum(np.median([_at(c, t)[0] for c in curves], axis=0) ** 2)
+    stop = float(t[np.searchsorted(past, _PAST * past[-1])]) if past[-1] > 0 else last
+    return np.linspace(0.0, min(1.1 * stop, last), _INSTANTS)
 
 
-def instants() -> np.ndarray:
-    return np.arange(START_S, STOP_S + STEP_S / 2, STEP_S)
-
-
-def registered(curve: Curve, onto: np.ndarray, scaled: bool) -> tuple[np.ndarray, np.ndarray]:
-    """``curve`` moved and stretched (and ``scaled``) to fit ``onto``, values at the common instants: (values, sigma).
+def registered(curve: Curve, t: np.ndarray, onto: np.ndarray, scaled: bool) -> tuple[np.ndarray, np.ndarray]:
+    """``curve`` moved and stretched (and ``scaled``) to fit ``onto`` at the instants ``t``: (values, sigma).
 
     The best of a grid of shifts and stretches, then of a finer one about it."""
-    t = instants()
     best, shift, stretch = np.inf, 0.0, 1.0
     for width, steps in ((1.0, 9), (0.2, 9)):
         around = (shift, stretch)
-        for a in around[0] + width * _SHIFT_S * np.linspace(-1, 1, steps):
+        for a in around[0] + width * _SHIFT * t[-1] * np.linspace(-1, 1, steps):
             for b in around[1] + width * _STRETCH * np.linspace(-1, 1, steps):
                 v = np.interp(a + b * t, curve.time_s, curve.values)
                 size = _size(v, onto) if scaled else 1.0
@@ -65,10 +61,10 @@ def registered(curve: Curve, onto: np.ndarray, scaled: bool) -> tuple[np.ndarray
 
 def distance(a: Curve, b: Curve) -> float:
     """How different two curves are once registered: rms difference as a share of their own rms, symmetric. []"""
-    both = []
+    both, t = [], instants([a, b])
     for one, other in ((a, b), (b, a)):
-        onto, _ = _at(other, instants())
-        moved, _ = registered(one, onto, scaled=False)
+        onto, _ = _at(other, t)
+        moved, _ = registered(one, t, onto, scaled=False)
         both.append(np.sqrt(np.mean((moved - onto) ** 2) / (0.5 * np.mean(moved**2 + onto**2))))
     return float(np.mean(both))
 
@@ -82,9 +78,10 @@ def shape_of(newest: Curve, past: list[Curve], day) -> Shape | None:
     theirs (Student's t)."""
     if len(past) < FEWEST_CURVES:
         return None
-    onto = np.median([_at(c, instants())[0] for c in past], axis=0)
-    values = np.array([registered(c, onto, scaled=True)[0] for c in past])
-    new, _ = registered(newest, onto, scaled=True)
+    t = instants(past)
+    onto = np.median([_at(c, t)[0] for c in past], axis=0)
+    values = np.array([registered(c, t, onto, scaled=True)[0] for c in past])
+    new, _ = registered(newest, t, onto, scaled=True)
     own = np.array([
         _apart(values[k], np.delete(values, k, axis=0), day[k], np.delete(day[:-1], k)) for k in range(len(past))
     ])  # fmt: skip
@@ -99,10 +96,11 @@ def shape_of(newest: Curve, past: list[Curve], day) -> Shape | None:
 
 def family_band(curves: list[Curve], share: float = 0.95) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(times, low, high): where a further curve of the family would run with that probability at each instant."""
-    values = np.array([_at(c, instants())[0] for c in curves])
+    t = instants(curves)
+    values = np.array([_at(c, t)[0] for c in curves])
     n = len(values)
     reach = stats.t.ppf(0.5 + share / 2, n - 1) * values.std(axis=0, ddof=1) * np.sqrt(1 + 1 / n)
-    return instants(), values.mean(axis=0) - reach, values.mean(axis=0) + reach
+    return t, values.mean(axis=0) - reach, values.mean(axis=0) + reach
 
 
 def _apart(curve, family, day: float, days) -> float:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from ..kit.errors import BadInput, some_of
+from .curves import TORQUE, distance
 from .newest import Newest
 from .pairs import COLD_DAYS, WARM_DAYS, Equivalence, whole_days
 from .slope import Trend
@@ -73,6 +77,28 @@ def cold_warm_record(h: Health) -> dict:
         "equivalence": [equivalence_record(e) for e in h.equivalences],
         "curves": None if d is None else {"pairs": list(d.pairs), "others": list(d.others), "p_value": d.p_value},
     }  # fmt: skip
+
+
+def two_record(health: Health, first: str, second: str) -> dict:
+    """Two events' figures side by side, and how far apart their curves are.  Raises BadInput for an unknown one."""
+    by_name = {e.event: e for e in health.entries}
+    for name in (first, second):
+        if name not in by_name:
+            raise BadInput(f"no {health.kind} called {name!r} has figures", remedy=f"There are: {some_of(by_name)}.")
+    a, b = by_name[first], by_name[second]
+    rows = []
+    for v in a.values:
+        w = b.value(v.figure, v.basis)
+        if v.basis not in ("fused", "telemetry") or w is None or v.value is None or w.value is None:
+            continue
+        sigma = None if v.sigma is None or w.sigma is None else float(np.hypot(v.sigma, w.sigma))
+        rows.append({
+            "figure": v.figure, "unit": v.unit, "first": v.value, "second": w.value,
+            "difference": w.value - v.value, "sigma_difference": sigma,
+        })  # fmt: skip
+    one, other = a.curve(TORQUE), b.curve(TORQUE)
+    apart = None if one is None or other is None else distance(one, other)
+    return {"first": first, "second": second, "figures": rows, "curve_distance": apart}
 
 
 def health_record(h: Health) -> dict:

@@ -1,0 +1,79 @@
+"""From a store to verdicts: what it holds of one craft, limits in their units, each kind judged."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..craft.load import built_in_crafts, load_craft
+from ..kit.errors import BadInput, some_of
+from ..kit.quantities import quantity
+from .entry import Entry
+from .store import TrendStore
+from .verdicts import MOVES, Health, judge
+
+
+def entries_in(store: str, craft: str | None, *, curves: bool) -> tuple[list[Entry], str]:
+    """Latest entries of the one craft asked for, and its name.
+
+    Raises BadInput where there is no store, it is empty, or ``craft`` is not given and there are several."""
+    with TrendStore.open(store, create=False) as trends:
+        crafts = trends.crafts()
+        if craft is not None:
+            craft = Path(craft).stem if craft.endswith(".toml") else craft
+        if not crafts or (craft is not None and craft not in crafts):
+            what = "is empty" if not crafts else f"holds nothing of {craft!r}"
+            raise BadInput(f"the store {what}", file=trends,
+                           remedy=f"Crafts it holds: {some_of(crafts)}. `asflown trend add` fills it.")  # fmt: skip
+        if craft is None and len(crafts) > 1:
+            raise BadInput(
+                f"the store holds several crafts: {some_of(crafts)}", file=trends, remedy="Choose one with --craft."
+            )
+        name = craft or crafts[0]
+        return trends.entries(name, curves=curves), name
+
+
+def health_in(store: str, craft: str | None, kind: str, limits: list[str], **options) -> Health:
+    """The verdict on one kind; ``limits`` as in ``limits_of``, ``options`` as of ``judge``."""
+    entries, name = entries_in(store, craft, curves=True)
+    return _judged(entries, name, kind, limits_of(limits, entries), **options)
+
+
+def healths_in(store: str, craft: str | None, limits: list[str]) -> list[Health]:
+    """Verdicts on every kind that has figures: deploys, stows, wheels.  Raises BadInput where there is none."""
+    entries, name = entries_in(store, craft, curves=True)
+    kinds = [k for k in (*MOVES, "wheels") if any(e.kind == k and e.values for e in entries)]
+    if not kinds:
+        raise BadInput(
+            f"the store holds nothing of {name} with figures of merit",
+            remedy="`asflown trend add` and `asflown wheels --store` fill it.",
+        )
+    limit = limits_of(limits, entries)
+    return [_judged(entries, name, kind, limit) for kind in kinds]
+
+
+def limits_of(texts: list[str], entries: list[Entry]) -> dict[str, float]:
+    """'angular_impulse=-0.5 N m s' -> SI by figure.  Raises BadInput for an unknown figure or a unit of another kind."""
+    units = {v.figure: v.unit for e in entries for v in e.values}
+    found = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals or name.strip() not in units:
+            raise BadInput(f"--limit {text!r} does not name a figure of this store",
+                           remedy=f'Write it as in "angular_impulse=-0.5 N m s". Figures: {some_of(units)}.')  # fmt: skip
+        found[name.strip()] = quantity(value.strip(), units[name.strip()])
+    return found
+
+
+def _judged(entries: list[Entry], name: str, kind: str, limits: dict[str, float], **options) -> Health:
+    moves = kind in MOVES
+    counted = [e for e in entries if e.kind == kind or (moves and e.kind in MOVES)]
+    allowed = _cycles_allowed(name, counted) if moves else None
+    return judge(counted, kind=kind, cycles_allowed=allowed, limits=limits, **options)
+
+
+def _cycles_allowed(name: str, entries: list[Entry]) -> int | None:
+    """Of the mechanism that the entries are of, where the craft is a built-in one."""
+    moved = {e.provenance["mechanism"] for e in entries if "mechanism" in e.provenance}
+    if name not in built_in_crafts() or len(moved) != 1:
+        return None
+    return load_craft(name).mechanism(moved.pop()).cycles_allowed
