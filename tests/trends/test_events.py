@@ -1,6 +1,8 @@
 """Event lists and actuations found in telemetry: good ones read, bad ones refused with one clear error."""
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from asflown import fly
 from asflown.kit.errors import BadInput
@@ -100,3 +102,18 @@ def test_a_motor_that_never_runs_is_said(flights):
     quiet = flights["cover-deploy"].between(0, 55)
     with pytest.raises(BadInput, match="no whole actuation"):
         find_events(quiet)
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    text=st.sampled_from([TOML, CSV]), at=st.floats(0, 1), cut=st.integers(0, 12),
+    put=st.text(st.characters(codec="utf-8"), max_size=8),
+)  # fmt: skip
+def test_property_a_mutated_list_is_read_or_refused(tmp_path, text, at, cut, put):
+    """Whatever is done to a list, there are events or one BadInput; nothing else escapes."""
+    k = int(at * len(text))
+    path = listed(tmp_path, text[:k] + put + text[k + cut :], "events.csv" if text is CSV else "events.toml")
+    try:
+        assert all(e.id and e.kind in ("deploy", "stow") for e in load_events(path))
+    except BadInput as why:
+        assert why.what and why.remedy
