@@ -114,6 +114,18 @@ def test_compare_finds_the_pairs_and_any_two(store):
     assert run("trend", "compare", "--store", store).out.count("cold deploy-") == 3
 
 
+def test_wheels_are_kept_beside_actuations(flown):
+    folder, _ = flown
+    done = run("wheels", folder / "flight.csv", "--store", folder / "t.db", "--json")
+    assert done.code == 0 and done.record["command"] == "wheels" and "kept as wheels-2015-09-29, revision 1" in done.err
+    shown = run(
+        "trend", "show", "--store", folder / "t.db", "--kind", "wheels", "--figure", "revolutions_RWA1", "--json"
+    )
+    assert shown.record["rows"][0]["value"] > 1000
+    report = run("report", folder / "t.db", "--out", folder / "r.html", "--json").record
+    assert [k["kind"] for k in report["kinds"]] == ["deploy", "wheels"]
+
+
 def test_report_writes_a_page_and_its_twin(store, tmp_path):
     done = run("report", store, "--out", tmp_path / "r.html", "--json")
     assert done.code == 0 and done.record["verdict"] == "watch"
