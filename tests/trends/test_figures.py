@@ -26,6 +26,8 @@ def test_law_impulse_of_lines_is_exact():
     assert torque.impulse(0.0, 81.0).value == pytest.approx(-0.16, rel=1e-12)
     assert torque.impulse(0.25, 0.75).value == pytest.approx(-0.5e-4 * (0.75**2 - 0.25**2), rel=1e-9)
     assert torque.impulse(0.0, 81.0).sigma is None
+    beyond = torque.impulse(0.0, 500.0)
+    assert beyond.value is None and "does not hold 0 to 500 s" in beyond.doubt
 
 
 def test_law_peaks_are_the_two_largest_of_each_sign():

@@ -47,7 +47,10 @@ class Torque:
     start_sigma_s: float = 0.0  # how well the motor's start is known
 
     def impulse(self, start_s: float, stop_s: float) -> Measured:
-        """Angular impulse between two times from the motor's start. [N m s]"""
+        """Angular impulse between two times from the motor's start; unknown beyond the record. [N m s]"""
+        step = float(self.time_s[1] - self.time_s[0])
+        if start_s < self.time_s[0] - step or stop_s > self.time_s[-1] + step:
+            return Measured(None, None, f"the record does not hold {start_s:g} to {stop_s:g} s after the motor's start")
         value = float(_area(self.time_s, self.mean_Nm, start_s, stop_s))
         if not len(self.drawn_Nm):
             return Measured(value)
