@@ -58,7 +58,11 @@ def test_add_keeps_and_says_what(flown):
     assert [a["revision"] for a in again["added"]] == [2]
     with TrendStore.open(folder / "t.db", create=False) as trends:
         (kept,) = trends.entries(event="one")
-    assert kept.provenance["inputs"][0]["sha256"] and kept.provenance["versions"]["asflown"]
+    assert (
+        kept.provenance["cycles_allowed"] == 20
+        and kept.provenance["inputs"][0]["sha256"]
+        and kept.provenance["versions"]["asflown"]
+    )
     listed = run("trend", "list", "--store", folder / "t.db", "--json").record
     assert [(e["event"], e["days_since_last"]) for e in listed["events"]] == [("before", None), ("one", 77)]
     with_value = run("trend", "list", "--store", folder / "t.db", "--figure", "angular_impulse", "--json").record[

@@ -81,7 +81,8 @@ def analyse(event: Event, craft: Craft, telemetry: Telemetry | None = None) -> E
         {"inputs": [{"file": tlm.source, "sha256": tlm.sha256}],
          "inertia": {k: settings[k] for k in settings if "inertia" in k},
          "fused": {k: settings[k] for k in ("prior", "loop", "seed") if k in settings},
-         "motor_on_s": event.motor_on_s, "motor_off_s": event.motor_off_s, "mechanism": mechanism.name},
+         "motor_on_s": event.motor_on_s, "motor_off_s": event.motor_off_s, "mechanism": mechanism.name,
+         "cycles_allowed": mechanism.cycles_allowed},
     )  # fmt: skip
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..craft.load import built_in_crafts, load_craft
 from ..kit.errors import BadInput, some_of
 from ..kit.quantities import quantity
 from .entry import Entry
@@ -34,8 +33,8 @@ def entries_in(store: str, craft: str | None, *, curves: bool) -> tuple[list[Ent
 
 def health_in(store: str, craft: str | None, kind: str, limits: list[str], **options) -> Health:
     """The verdict on one kind; ``limits`` as in ``limits_of``, ``options`` as of ``judge``."""
-    entries, name = entries_in(store, craft, curves=True)
-    return _judged(entries, name, kind, limits_of(limits, entries), **options)
+    entries, _ = entries_in(store, craft, curves=True)
+    return _judged(entries, kind, limits_of(limits, entries), **options)
 
 
 def healths_in(store: str, craft: str | None, limits: list[str]) -> list[Health]:
@@ -48,7 +47,7 @@ def healths_in(store: str, craft: str | None, limits: list[str]) -> list[Health]
             remedy="`asflown trend add` and `asflown wheels --store` fill it.",
         )
     limit = limits_of(limits, entries)
-    return [_judged(entries, name, kind, limit) for kind in kinds]
+    return [_judged(entries, kind, limit) for kind in kinds]
 
 
 def limits_of(texts: list[str], entries: list[Entry]) -> dict[str, float]:
@@ -64,16 +63,14 @@ def limits_of(texts: list[str], entries: list[Entry]) -> dict[str, float]:
     return found
 
 
-def _judged(entries: list[Entry], name: str, kind: str, limits: dict[str, float], **options) -> Health:
+def _judged(entries: list[Entry], kind: str, limits: dict[str, float], **options) -> Health:
     moves = kind in MOVES
     counted = [e for e in entries if e.kind == kind or (moves and e.kind in MOVES)]
-    allowed = _cycles_allowed(name, counted) if moves else None
+    allowed = _cycles_allowed(counted) if moves else None
     return judge(counted, kind=kind, cycles_allowed=allowed, limits=limits, **options)
 
 
-def _cycles_allowed(name: str, entries: list[Entry]) -> int | None:
-    """Of the mechanism that the entries are of, where the craft is a built-in one."""
-    moved = {e.provenance["mechanism"] for e in entries if "mechanism" in e.provenance}
-    if name not in built_in_crafts() or len(moved) != 1:
-        return None
-    return load_craft(name).mechanism(moved.pop()).cycles_allowed
+def _cycles_allowed(entries: list[Entry]) -> int | None:
+    """Of the mechanism, as its craft said when the latest of them was analysed."""
+    said = [e.provenance["cycles_allowed"] for e in entries if "cycles_allowed" in e.provenance]
+    return said[-1] if said else None
