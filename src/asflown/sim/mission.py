@@ -11,17 +11,15 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from ..craft.model import Kilogram, NewtonMetre, RadianPerSecond, Second, _in
-from ..kit.config import validated
 from ..kit.errors import BadInput, some_of
 from ..kit.timeline import NS, utc_to_tai_ns
-from .plans import merged, read_plan, shipped
-from .scenario import NoiseName, _Part
+from .plans import Part, Plan, shipped
+from .scenario import NoiseName
 
 Kind = Literal["deploy", "stow"]
-_REMEDY = "See docs/simulator.md, Missions, for the keys; every value carries its unit."
 _DAY_NS = 86_400 * NS
 
 
@@ -40,7 +38,7 @@ Sigma = Annotated[float, Field(ge=0, le=30, allow_inf_nan=False)]
 Factor = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
 
 
-class Actuation(_Part):
+class Actuation(Part):
     """One actuation; one that is not flown counts for dormancy and cycles only."""
 
     id: str = Field(default="", pattern=r"^([A-Za-z0-9][A-Za-z0-9._-]*)?$")  # it names a folder
@@ -58,7 +56,7 @@ class Actuation(_Part):
         return int(utc_to_tai_ns(self.date))
 
 
-class Motion(_Part):
+class Motion(Part):
     """How a kind moves, and its true figures of merit when ageing starts; torques on the body, with their sign."""
 
     scenario: str
@@ -67,7 +65,7 @@ class Motion(_Part):
     peak_negative: NewtonMetre = Field(lt=0)
 
 
-class Ageing(_Part):
+class Ageing(Part):
     """Figures change in a straight line in time from ``start``, where they are the motion's, to ``stop`` and beyond."""
 
     start: Date
@@ -82,7 +80,7 @@ class Ageing(_Part):
         return self
 
 
-class Scatter(_Part):
+class Scatter(Part):
     """From event to event, one standard deviation; each figure on its own."""
 
     impulse_percent: Sigma = 0.0
@@ -90,7 +88,7 @@ class Scatter(_Part):
     timing: Second = Field(default=0.0, ge=0, le=3)  # of each turn of the excursions
 
 
-class Cold(_Part):
+class Cold(Part):
     """What a long rest does to the figures of the next actuation."""
 
     after: Second = Field(default=200 * 86_400.0, gt=0)
@@ -98,7 +96,7 @@ class Cold(_Part):
     excursion_factor: Factor = 1.0
 
 
-class Fault(_Part):
+class Fault(Part):
     """A sudden change that stays, from an event on."""
 
     since: str
@@ -107,16 +105,18 @@ class Fault(_Part):
     excursion_factor: Factor = 1.0
 
 
-class CraftMass(_Part):
+class CraftMass(Part):
     date: Date
     mass: Kilogram = Field(gt=0)
     source: str
 
 
-class Mission(_Part):
+class Mission(Plan):
     """Actuations of one mechanism over the years."""
 
-    name: str = ""
+    KIND = "mission"
+    REMEDY = "See docs/simulator.md, Missions, for the keys; every value carries its unit."
+
     description: str = ""
     craft: str = "cassini"
     seed: int = Field(default=1, ge=0)
@@ -131,9 +131,6 @@ class Mission(_Part):
     craft_mass: tuple[CraftMass, ...] = Field(min_length=1)
     events: tuple[Actuation, ...] = Field(min_length=1)
     assumptions: tuple[str, ...] = ()
-
-    _written: dict = PrivateAttr(default_factory=dict)
-    _folder: Path = PrivateAttr(default=Path())
 
     @model_validator(mode="after")
     def _consistent(self):
@@ -159,16 +156,6 @@ class Mission(_Part):
         return self
 
     @property
-    def folder(self) -> Path:
-        """Where scenarios it names by file are looked for."""
-        return self._folder
-
-    @property
-    def as_written(self) -> dict:
-        """The TOML's content, changes included: what to keep in order to fly it again."""
-        return self._written
-
-    @property
     def flown(self) -> tuple[Actuation, ...]:
         return tuple(e for e in self.events if e.flown)
 
@@ -182,18 +169,6 @@ class Mission(_Part):
         """Mass of the whole craft on a date: straight in time between those given."""
         dates = [float(utc_to_tai_ns(m.date)) for m in self.craft_mass]
         return float(np.interp(tai_ns, dates, [m.mass for m in self.craft_mass]))
-
-    def changed(self, **changes) -> Mission:
-        """Another mission; values as in the TOML: ``seed=4``, ``scatter={"impulse_percent": 0.0}``.
-
-        Tables are merged key by key, lists replaced.  Raises BadInput as ``load_mission`` does."""
-        return _checked(merged(self._written, changes), self.name or "mission", self._folder)
-
-
-def _checked(written: dict, where: str, folder: Path) -> Mission:
-    mission = validated(Mission, written, where, _REMEDY)
-    mission._written, mission._folder = written, folder
-    return mission
 
 
 def shipped_missions() -> list[str]:
@@ -218,4 +193,4 @@ def load_mission(name_or_path: str | Path) -> Mission:
     """A shipped mission by name, or one from a TOML file.
 
     Raises BadInput for an unknown name, an unreadable file, an unknown key or a wrong unit."""
-    return _checked(*read_plan(name_or_path, "mission"))
+    return Mission.load(name_or_path)

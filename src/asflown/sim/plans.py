@@ -4,9 +4,59 @@ from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
+from typing import ClassVar, Self
 
-from ..kit.config import read_bytes, toml_table
+from pydantic import BaseModel, ConfigDict, PrivateAttr
+
+from ..kit.config import read_bytes, toml_table, validated
 from ..kit.errors import BadInput, some_of
+
+
+class Part(BaseModel):
+    """A table of a plan: frozen, and no key that is not known."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Plan(Part):
+    """What a TOML file says is to be flown, with the file's content kept."""
+
+    KIND: ClassVar[str]  # 'scenario' or 'mission'
+    REMEDY: ClassVar[str]  # where its keys are explained
+
+    name: str = ""
+
+    _written: dict = PrivateAttr(default_factory=dict)
+    _folder: Path = PrivateAttr(default=Path())
+
+    @property
+    def folder(self) -> Path:
+        """Where files it names are looked for."""
+        return self._folder
+
+    @property
+    def as_written(self) -> dict:
+        """The TOML's content, changes included: what to keep in order to fly it again."""
+        return self._written
+
+    @classmethod
+    def load(cls, name_or_path: str | Path) -> Self:
+        """A shipped one by name, or one from a TOML file.
+
+        Raises BadInput for an unknown name, an unreadable file, an unknown key or a wrong unit."""
+        return cls._checked(*_read(name_or_path, cls.KIND))
+
+    def changed(self, **changes) -> Self:
+        """Another one; values as in the TOML: ``duration="60 s"``, ``scatter={"impulse_percent": 0.0}``.
+
+        Tables are merged key by key, lists replaced.  Raises BadInput as ``load`` does."""
+        return self._checked(_merged(self._written, changes), self.name or self.KIND, self._folder)
+
+    @classmethod
+    def _checked(cls, written: dict, where: str, folder: Path) -> Self:
+        plan = validated(cls, written, where, cls.REMEDY)
+        plan._written, plan._folder = written, folder
+        return plan
 
 
 def shipped(kind: str) -> list[str]:
@@ -14,7 +64,7 @@ def shipped(kind: str) -> list[str]:
     return sorted(p.name.removesuffix(".toml") for p in _folder(kind).iterdir() if p.name.endswith(".toml"))
 
 
-def read_plan(name_or_path: str | Path, kind: str) -> tuple[dict, str, Path]:
+def _read(name_or_path: str | Path, kind: str) -> tuple[dict, str, Path]:
     """The TOML's content with its name in it, what to call the file in a complaint, and the folder it is in.
 
     Raises BadInput for an unknown name, or a file that cannot be read or is not TOML."""
@@ -34,12 +84,12 @@ def read_plan(name_or_path: str | Path, kind: str) -> tuple[dict, str, Path]:
     return {"name": path.stem} | toml_table(source, name), name, folder
 
 
-def merged(old: dict, new: dict) -> dict:
+def _merged(old: dict, new: dict) -> dict:
     """``old`` with the keys of ``new``; tables key by key, lists replaced."""
     both = dict(old)
     for key, value in new.items():
         deep = isinstance(value, dict) and isinstance(both.get(key), dict)
-        both[key] = merged(both[key], value) if deep else value
+        both[key] = _merged(both[key], value) if deep else value
     return both
 
 

@@ -10,15 +10,14 @@ from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from ..craft.model import Direction, InertiaElements, Kilogram, Metre, NewtonMetre, Radian, RadianPerSecond, Second, _in
-from ..kit.config import validated
 from ..kit.errors import BadInput
 from ..kit.quantities import numbers, quantity
 from ..kit.timeline import utc_to_tai_ns
 from ..telemetry.channels import AXES, kind_of
-from .plans import merged, read_plan, shipped
+from .plans import Part, Plan, shipped
 
 NoiseName = Literal["none", "half", "nominal", "double"]
 
@@ -48,11 +47,7 @@ TorqueVector, RateVector = _in("N m", 3), _in("rad/s", 3)
 RadianPerSecond2, KilometrePerSecond, Kelvin = _in("rad/s2"), _in("m/s"), _in("K")
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Triangles(_Part):
+class Triangles(Part):
     """Repeated triangular pulses about one body axis, alternating in sign (000 section VI)."""
 
     shape: Literal["triangles"]
@@ -63,14 +58,14 @@ class Triangles(_Part):
     count: int = Field(ge=1)
 
 
-class Constant(_Part):
+class Constant(Part):
     """A constant torque in body axes, such as 001 Appendix A's non-gravitational one."""
 
     shape: Literal["constant"]
     torque: TorqueVector
 
 
-class Table(_Part):
+class Table(Part):
     """A torque about one body axis, linear between instants, zero outside; inline, or columns of a CSV
     (header ``time [s],x [N m],y [N m],z [N m]``, any of the axes)."""
 
@@ -93,7 +88,7 @@ class Table(_Part):
         return self
 
 
-class Plume(_Part):
+class Plume(Part):
     """Drag torque of a plume of gas on a straight flyby (004 eqs 21-27, its Tables 2 and 3)."""
 
     shape: Literal["plume"]
@@ -107,7 +102,7 @@ class Plume(_Part):
 AnyTorque = Annotated[Triangles | Constant | Table | Plume, Field(discriminator="shape")]
 
 
-class Slew(_Part):
+class Slew(Part):
     """A rest-to-rest turn about an axis fixed in the body: constant acceleration, coast, deceleration."""
 
     start: Second
@@ -123,7 +118,7 @@ class Slew(_Part):
         return self
 
 
-class Coast(_Part):
+class Coast(Part):
     """A wheel left to its bearing: the motor is off, and an ideal torque from outside does its part of the hold.
 
     001 holds the attitude with thrusters in a run-down; their pulses are not modelled here."""
@@ -139,7 +134,7 @@ class Coast(_Part):
         return self
 
 
-class DragSpike(_Part):
+class DragSpike(Part):
     """Drag of one bearing that rises by ``torque`` for a while, as where its cage turns unstable.
 
     It comes and goes within EDGE_S, or a quarter of its duration."""
@@ -152,7 +147,7 @@ class DragSpike(_Part):
     torque: NewtonMetre = Field(gt=0)
 
 
-class CoverMotion(_Part):
+class CoverMotion(Part):
     """A part of the craft turning about its hinge, the angle prescribed by a table of rates.
 
     The rate is a monotone piecewise cubic through the table (continuous with its slope), scaled by
@@ -184,7 +179,7 @@ class CoverMotion(_Part):
         return self
 
 
-class Controller(_Part):
+class Controller(Part):
     """How the flight software is run; its gains are the craft's."""
 
     period: Second | None = Field(default=None, gt=0)  # the craft's own unless given
@@ -196,7 +191,7 @@ class Controller(_Part):
     friction_bandwidth: _in("rad/s") = 0.3  # type: ignore[valid-type]
 
 
-class Gap(_Part):
+class Gap(Part):
     """Samples that never reach the ground; channel is a name, a family ('wheel_rate') or '*'."""
 
     channel: str = "*"
@@ -204,7 +199,7 @@ class Gap(_Part):
     stop: Second
 
 
-class Sampling(_Part):
+class Sampling(Part):
     """What the telemetry holds: the interval of each family of channels; '0 s' leaves one out."""
 
     wheel_rate: Second = 4.0
@@ -249,10 +244,12 @@ def _is_channel(name: str) -> bool:
     return True
 
 
-class Scenario(_Part):
+class Scenario(Plan):
     """One flight."""
 
-    name: str = ""
+    KIND = "scenario"
+    REMEDY = "See docs/simulator.md for the keys; every value carries its unit."
+
     description: str = ""
     craft: str = "cassini"
     epoch: str = "2015-09-29T00:00:00"  # UTC
@@ -274,9 +271,6 @@ class Scenario(_Part):
     telemetry: Sampling = Sampling()
     assumptions: tuple[str, ...] = ()
 
-    _written: dict = PrivateAttr(default_factory=dict)
-    _folder: Path = PrivateAttr(default=Path())
-
     @model_validator(mode="after")
     def _dated(self):
         try:
@@ -289,29 +283,6 @@ class Scenario(_Part):
     def epoch_ns(self) -> int:
         return int(utc_to_tai_ns(self.epoch))
 
-    @property
-    def folder(self) -> Path:
-        """Where files it names are looked for."""
-        return self._folder
-
-    @property
-    def as_written(self) -> dict:
-        """The TOML's content, changes included: what to keep in order to fly it again."""
-        return self._written
-
-    def changed(self, **changes) -> Scenario:
-        """Another scenario; values as in the TOML: ``duration="60 s"``, ``controller={"delay_cycles": 1}``.
-
-        Tables are merged key by key, lists replaced.  Raises BadInput as ``load_scenario`` does."""
-        return _checked(merged(self._written, changes), self.name or "scenario", self._folder)
-
-
-def _checked(written: dict, where: str, folder: Path) -> Scenario:
-    remedy = "See docs/simulator.md for the keys; every value carries its unit."
-    scenario = validated(Scenario, written, where, remedy)
-    scenario._written, scenario._folder = written, folder
-    return scenario
-
 
 def shipped_scenarios() -> list[str]:
     """Names that ``load_scenario`` and ``fly`` take without a file."""
@@ -322,7 +293,7 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     """A shipped scenario by name, or one from a TOML file.
 
     Raises BadInput for an unknown name, an unreadable file, an unknown key or a wrong unit."""
-    return _checked(*read_plan(name_or_path, "scenario"))
+    return Scenario.load(name_or_path)
 
 
 def axis_number(axis: str) -> int:
