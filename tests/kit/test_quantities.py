@@ -48,3 +48,9 @@ def test_the_radian_is_not_dropped():
     assert si_factor("mrad", "rad") == 1e-3
     with pytest.raises(BadInput):
         si_factor("m", "rad")
+
+
+@pytest.mark.parametrize("unit", ["1e400 rad/s", "1e400rad/s"])
+def test_a_unit_without_size_is_refused(unit):
+    with pytest.raises(BadInput, match="has no size"):
+        si_factor(unit, "rad/s")

@@ -6,6 +6,7 @@ and factors are astropy's, with ``rpm`` and dimensionless ``[]`` added.
 
 from __future__ import annotations
 
+import math
 import re
 from functools import cache
 
@@ -56,12 +57,15 @@ def si_factor(text: str, expected: str) -> float:
     """
     got, want = parse_unit(text), parse_unit(expected)
     try:
-        return float(got.to(want))
+        factor = float(got.to(want))
     except Exception as why:
         raise BadInput(
             f"the unit [{text}] does not measure what is needed here ([{expected}])",
             remedy=f"Give a unit that converts to [{expected}].",
         ) from why
+    if not 0 < factor < math.inf:  # as of [1e400 rad]
+        raise BadInput(f"the unit [{text}] has no size", remedy=f"Give a unit that converts to [{expected}].")
+    return factor
 
 
 def quantity(text: object, expected: str) -> float:
