@@ -1,6 +1,8 @@
 # Sourced by run: a throw-away PostgreSQL server for the tests, its URL in ASFLOWN_TEST_POSTGRESQL.
 # A URL that is set already is used as it is.  Where no server can be had, the tests skip it and say so.
 
+. .ci/apt.sh
+
 postgresql_programs() {  # the folder of initdb and pg_ctl
   local found
   found=$(command -v initdb || ls -d /usr/lib/postgresql/*/bin/initdb 2>/dev/null | sort -V | tail -n 1 || true)
@@ -8,13 +10,10 @@ postgresql_programs() {  # the folder of initdb and pg_ctl
 }
 
 install_postgresql() {
-  local root=() apt
-  [ "$(id -u)" = 0 ] || root=(sudo -n)
-  apt=("${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq)
-  command -v apt-get >/dev/null && "${apt[@]}" update && "${apt[@]}" install -y postgresql-common || return 1
+  apt_install postgresql-common || return 1
   # Only the programs: no server of the system's own.
-  "${root[@]}" sed -ri 's/^#?create_main_cluster .*/create_main_cluster = false/' /etc/postgresql-common/createcluster.conf || true
-  "${apt[@]}" install -y postgresql
+  "${AS_ROOT[@]}" sed -ri 's/^#?create_main_cluster .*/create_main_cluster = false/' /etc/postgresql-common/createcluster.conf || true
+  apt_install postgresql
 }
 
 as_postgresql_user() {  # initdb and the server refuse to run as root
