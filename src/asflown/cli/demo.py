@@ -7,7 +7,7 @@ from pathlib import Path
 import typer
 
 from .options import JSON
-from .output import plain, print_doubts, print_json, provenance, say, wrapped
+from .output import print_doubts, print_json, provenance, say, wrapped
 
 SEED = 2016
 PROFILES = {"profile-1": ("Table 3", "21"), "profile-2": ("Table 4", "22")}
@@ -170,7 +170,7 @@ def _mission(out: Path) -> dict:
     say("judging and drawing")
     healths = healths_in(str(store), None, [])
     page = out / "report.html"
-    write_report(healths, page, plain(provenance({}, {"store": str(store)}, SEED)))
+    write_report(healths, page, provenance({}, {"store": str(store)}, SEED))
     deploys = healths[0]
     wanted = {name.rpartition("_N")[0]: v for name, v in truth["law"]["change_percent"].items()}
     found = {f["figure"]: f for f in map(figure_record, deploys.figures) if f["basis"] == "fused"}

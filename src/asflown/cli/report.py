@@ -7,7 +7,7 @@ from pathlib import Path
 import typer
 
 from .options import JSON
-from .output import plain, print_json, provenance, say, wrapped
+from .output import print_json, provenance, say, wrapped
 from .trend import LIMIT, WHOSE, without_password
 
 
@@ -31,7 +31,7 @@ def report(
 
     healths = healths_in(store, craft, limit)
     origin = provenance({}, {"store": without_password(store), "craft": craft, "limit": list(limit)})
-    twin, record = write_report(healths, out, plain(origin))
+    twin, record = write_report(healths, out, origin)
     if json:
         print_json(record)
         return

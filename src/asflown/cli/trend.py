@@ -64,13 +64,13 @@ def add(
             "command": "trend add", "store": without_password(store), "craft": ship.name,
             "added": [
                 {"event": e.event, "kind": e.kind, "date": e.date, "revision": e.revision,
-                 "figures": sum(v.value is not None for v in e.values), "doubts": list(e.doubts)} for e in added
+                 "figures": e.known, "doubts": list(e.doubts)} for e in added
             ],
             "doubts": list(dict.fromkeys(d for e in added for d in e.doubts)), "provenance": origin,
         })  # fmt: skip
         return
     for e in added:
-        kept = f"{sum(v.value is not None for v in e.values):3d} figures" if e.values else "its date only"
+        kept = f"{e.known:3d} figures" if e.values else "its date only"
         print(f"  {e.event:24s} {e.date[:10]}  revision {e.revision}  {kept}")
     for doubt, names in doubts_by_event(added).items():
         print(wrapped("  DOUBT  ", f"{doubt} ({names})"))
@@ -82,18 +82,19 @@ def list_(store: str = STORE, figure: str = FIGURE, basis: str = BASIS, craft: s
     """Events in the store in order of date, with days since the last actuation and cycles used, both from the dates."""
     from asflown.kit.errors import BadInput, some_of
     from asflown.trends.board import entries_in
+    from asflown.trends.entry import MOVES
     from asflown.trends.pairs import cycles, rests, whole_days
 
     entries, name = entries_in(store, craft, curves=False)
     known = {v.figure for e in entries for v in e.values}
     if figure is not None and figure not in known:
         raise BadInput(f"the store holds no figure {figure!r}", remedy=f"It holds: {some_of(sorted(known))}.")
-    moves = [e for e in entries if e.kind in ("deploy", "stow")]
+    moves = [e for e in entries if e.kind in MOVES]
     rest = rests(moves)
     rows: list[dict] = [
         {"event": e.event, "kind": e.kind, "date": e.date, "revision": e.revision, "motor": e.motor,
          "days_since_last": whole_days(rest[e.event]) if e.event in rest else None,
-         "figures": sum(v.value is not None for v in e.values), "doubts": list(e.doubts)}
+         "figures": e.known, "doubts": list(e.doubts)}
         | ({} if figure is None else {"value": value_of(e, figure, basis), "figure": figure}) for e in entries
     ]  # fmt: skip
     if json:
@@ -125,13 +126,14 @@ def show(
 ) -> None:
     """A figure over the years: robust slope and change with intervals, permutation p-value, what would have been seen."""
     from asflown.trends.board import health_in
+    from asflown.trends.entry import BEST
     from asflown.trends.record import figure_record
 
     health = health_in(store, craft, kind, limit)
     found = (
         [health.figure(figure, basis)]
         if figure
-        else [f for f in health.figures if f.basis in (basis or "fused", "telemetry")]
+        else [f for f in health.figures if f.basis in (basis or BEST[0], BEST[1])]
     )
     if plot is not None:
         from asflown.plots.figure import save
@@ -199,21 +201,21 @@ def watch(
 ) -> None:
     """Judge the newest actuation against the family of the past ones: pass, watch or alarm, and why.  Exit 3 on alarm."""
     from asflown.trends.board import health_in
-    from asflown.trends.record import figure_record, health_record
+    from asflown.trends.entry import BEST
+    from asflown.trends.record import cycles_record, figure_record, shape_record
     from asflown.trends.verdicts import ORDER
 
     health = health_in(store, craft, kind, limit, until=event)
     verdict, reasons = health.verdict, list(health.reasons)
-    figures = [f for f in health.figures if f.newest is not None and f.basis in ("fused", "telemetry")]
+    figures = [f for f in health.figures if f.newest is not None and f.basis in BEST]
     if figure is not None:
         figures = [health.figure(figure)]
         verdict, reasons = figures[0].verdict, list(figures[0].reasons)
     if json:
-        whole = health_record(health)
         print_json({
-            "command": "trend watch", "craft": health.craft, "kind": kind, "event": whole["newest_event"],
+            "command": "trend watch", "craft": health.craft, "kind": kind, "event": health.entries[-1].event,
             "verdict": verdict, "reasons": reasons, "figures": [figure_record(f) for f in figures],
-            "shape": whole["shape"], "cycles": whole["cycles"], "doubts": whole["doubts"],
+            "shape": shape_record(health), "cycles": cycles_record(health), "doubts": list(health.doubts),
             "provenance": provenance({}, {"store": without_password(store), "figure": figure, "event": event, "limit": limit}),
         })  # fmt: skip
     else:

@@ -83,10 +83,8 @@ def print_two(record: dict) -> None:
 
 
 def value_of(entry, figure: str, basis: str | None) -> float | None:
-    for b in (basis,) if basis else ("fused", "telemetry"):
-        if (v := entry.value(figure, b)) is not None:
-            return v.value
-    return None
+    found = entry.best(figure) if basis is None else entry.value(figure, basis)
+    return None if found is None else found.value
 
 
 def doubts_by_event(entries) -> dict[str, str]:

@@ -8,11 +8,13 @@ makes up for whatever the drag is, so that the rates follow the torque on the bo
 from __future__ import annotations
 
 from collections.abc import Collection
+from functools import cached_property
 
 import numpy as np
 
 from ..craft.model import Craft, Wheel
 from ..kit.errors import BadInput, some_of
+from ..telemetry import attitude
 from ..telemetry.channels import AXES
 from ..telemetry.telemetry import Channel, Telemetry
 from .drag_samples import find_spikes, opposing, robust_line
@@ -233,19 +235,23 @@ class _Study:
         """Seconds (N,) and what is ordered of a wheel's motor (N,) [N m]; None where that is not known.
 
         Three wheels share a torque on the body in one way only; with four it depends on software not described."""
+        names = [w.name for w in self.now.wheels]
+        if self._orders is None or name not in names:
+            return None
+        t, ordered = self._orders
+        return t, ordered[:, names.index(name)]
+
+    @cached_property
+    def _orders(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Of all three wheels in service, (N, 3)."""
         tlm, wheels = self.telemetry, self.now.wheels
-        names = [w.name for w in wheels]
-        if not tlm.has_axes("control_torque") or len(wheels) != 3 or name not in names:
+        if not tlm.has_axes("control_torque") or len(wheels) != 3:
             return None
         axes = np.array([w.axis for w in wheels], float).T
         if np.linalg.cond(axes) > 1e3:
             return None
-        parts = [tlm.channel(f"control_torque_{a}").usable for a in AXES]
-        common = parts[0].tai_ns
-        for c in parts[1:]:
-            common = np.intersect1d(common, c.tai_ns)
-        torque = np.column_stack([c.values[np.searchsorted(c.tai_ns, common)] for c in parts])
-        return tlm.seconds(common), -torque @ np.linalg.inv(axes)[names.index(name)]
+        tai_ns, torque = attitude.together(tlm, [f"control_torque_{a}" for a in AXES])
+        return tlm.seconds(tai_ns), -torque @ np.linalg.inv(axes).T
 
     def from_command(self, name: str, finder: Finder) -> DragFit | None:
         """Ordered torque less momentum gained, block by block: h_dot = ordered - drag."""

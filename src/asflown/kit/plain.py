@@ -7,6 +7,11 @@ from datetime import date
 from pathlib import Path
 
 
+def finite(number) -> float | None:
+    """The number as a plain float; None where it is none or not finite."""
+    return None if number is None or not math.isfinite(number) else float(number)
+
+
 def plain(value):
     """Anything a result holds, as JSON has it: numbers finite or null, arrays as lists."""
     if value is None or isinstance(value, (str, bool)):
@@ -14,7 +19,7 @@ def plain(value):
     if isinstance(value, int):
         return value
     if isinstance(value, float):
-        return value if math.isfinite(value) else None
+        return finite(value)
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, (Path, date)):

@@ -18,9 +18,13 @@ from ..kit.files import write_text
 from ..kit.plain import plain
 from ..plots import trend as draw
 from ..plots.figure import BLUE, GREY, save_svg
+from ..trends.analyse import BASES
+from ..trends.entry import MOVES
 from ..trends.record import health_record, sudden_words
-from ..trends.verdicts import MOVES, FigureHealth, Health
+from ..trends.verdicts import FigureHealth, Health
 
+#: Figures whose years are drawn first, whatever is found (000 Figs 17, 18).
+_FIRST = ("angular_impulse", "peak_positive", "peak_negative")
 #: Ink in which the pictures are drawn, to be replaced by the page's.
 _INK, _GRID = "#010203", "#e4e4e4"
 
@@ -46,7 +50,7 @@ def write_report(healths: list[Health], out: Path, provenance: dict) -> tuple[Pa
     }  # fmt: skip
     page = _template().render(
         healths=healths, main=healths[0], sections=[(h, _pictures(h)) for h in healths],
-        record=record, provenance=provenance, version=__version__,
+        provenance=provenance, version=__version__,
     )  # fmt: skip
     write_text(out, page)
     write_text(twin, json.dumps(plain(record), allow_nan=False, indent=1) + "\n")
@@ -62,32 +66,28 @@ def _pictures(h: Health) -> list[Picture]:
     def add(name: str, title: str, words: str, figure) -> None:
         pictures.append(Picture(title, words, _svg(figure, f"{h.kind}-{name}")))
 
-    for name in ("angular_impulse", "peak_positive", "peak_negative"):
+    for name in _FIRST:
         found = [f for f in h.figures if f.figure == name and len(f.rows) > 1]
         if found:
             add(name, f"{name.replace('_', ' ')} over the years", _trend_words(found[0]), draw.trend_figure(*found))
     for f in h.figures:
-        if (f.verdict != "pass" or (h.kind not in MOVES and f.trend_p_adjusted is not None)) and f.figure not in (
-            "angular_impulse",
-            "peak_positive",
-            "peak_negative",
-        ):
+        if f.figure not in _FIRST and (f.verdict != "pass" or (h.kind not in MOVES and f.trend_p_adjusted is not None)):
             add(f.figure, f"{f.figure.replace('_', ' ')} over the years", _trend_words(f), draw.trend_figure(f))
     if h.kind not in MOVES:
         return pictures
     if len(entries) > 3:
         add("family", "The newest in front of its family", f"{one}, fused, and where 95 of 100 further ones would run "
             "at each instant.", draw.family_figure(newest, entries[:-1], "newest against the past"))  # fmt: skip
-    for basis in ("fused", "momentum, printed", "transfer, printed"):
+    for basis in BASES:
         if any(e.curve(f"torque, {basis}") is not None for e in entries):
             add(f"overlay-{basis[:5]}", f"All {h.kind}s, {basis}", "Older ones in lighter grey, the first dotted blue, the newest red.",
                 draw.overlay_figure(entries, f"torque, {basis}", basis))  # fmt: skip
-    for basis in ("fused", "momentum, printed", "transfer, printed"):
+    for basis in BASES:
         if newest.curve(f"torque, {basis}") is not None:
             add(f"merit-{basis[:5]}", f"Figures of merit, {basis}", f"{one}: shaded the impulse of the first phase, dashed the mean "
                 "of the two largest excursions of each sign after it.", draw.merit_figure(newest, basis, basis))  # fmt: skip
     if h.pairs:
-        for basis in ("fused", "momentum, printed", "transfer, printed"):
+        for basis in BASES:
             add(f"cold-{basis[:5]}", f"Cold and warm, {basis}", "Crosses: after a long rest; rings: the next one. A colour a pair.",
                 draw.cold_warm_figure(h.pairs, f"torque, {basis}", basis))  # fmt: skip
     if newest.curve("motor_current") is not None:

@@ -47,7 +47,7 @@ class Plant(NamedTuple):
     reduced_mass: float
     motion_time: np.ndarray  # (b + 1,); (0,) without a moving part
     motion_angle: np.ndarray  # (5, b), quartics, highest power first
-    extra_drag_time: np.ndarray = np.empty(0)  # (s,), drag spikes, linear between; (0,) without any
+    extra_drag_time: np.ndarray = np.empty(0)  # (s,), drag spikes, linear between, zero at its ends; (0,) without any
     extra_drag: np.ndarray = np.empty((0, 0))  # (s, n), opposing each wheel's rate
 
 
@@ -115,8 +115,8 @@ def drag_torque(rate, viscous, coulomb, stiction):
 
 
 @jit
-def external_torque(t, times, values, out):
-    """Linear between the table's instants, held before and after. (3,) [N m]"""
+def table_at(t, times, values, out):
+    """Row of a table at an instant: linear between the table's own, held before and after; zero without any."""
     n = len(times)
     if n == 0:
         out[:] = 0.0
@@ -128,18 +128,8 @@ def external_torque(t, times, values, out):
         out[:] = values[n - 1]
     else:
         x = (t - times[j - 1]) / (times[j] - times[j - 1])
-        for i in range(3):
+        for i in range(len(out)):
             out[i] = (1 - x) * values[j - 1, i] + x * values[j, i]
-
-
-@jit
-def extra_drag(t, times, values, wheel):
-    """What a drag spike adds to one wheel's Coulomb drag: linear between the table's instants, zero outside. [N m]"""
-    j = np.searchsorted(times, t)
-    if j == 0 or j == len(times):
-        return 0.0
-    x = (t - times[j - 1]) / (times[j] - times[j - 1])
-    return (1 - x) * values[j - 1, wheel] + x * values[j, wheel]
 
 
 @jit
@@ -217,7 +207,7 @@ def _derivative(t, x, motor, outside, plant, dx):
     dx[3] = 0.5 * (q0 * w[2] + q1 * w[1] - q2 * w[0])
 
     torque, gyroscopic, H, right = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    external_torque(t, plant.torque_time, plant.torque, torque)
+    table_at(t, plant.torque_time, plant.torque, torque)
     torque += outside
     ledger[0] = torque[0] * w[0] + torque[1] * w[1] + torque[2] * w[2]
     mass = plant.fixed_inertia.copy()
@@ -235,12 +225,15 @@ def _derivative(t, x, motor, outside, plant, dx):
     ledger[1] = 0.0
     ledger[2] = 0.0
     ledger[3] = 0.0
+    spikes = len(plant.extra_drag_time) > 0
+    extra = np.zeros(n if spikes else 0)
+    if spikes:
+        table_at(t, plant.extra_drag_time, plant.extra_drag, extra)
     for k in range(n):
         J, a = plant.spin_inertia[k], plant.wheel_axes[k]
         drag = drag_torque(rho[k], plant.drag[k, 0], plant.drag[k, 1], plant.drag[k, 2])
-        if len(plant.extra_drag_time) > 0:
-            more = extra_drag(t, plant.extra_drag_time, plant.extra_drag, k)
-            drag += more * np.tanh(rho[k] / DRAG_REVERSAL_RATE)
+        if spikes:
+            drag += extra[k] * np.tanh(rho[k] / DRAG_REVERSAL_RATE)
         dx[7 + k] = (motor[k] - drag) / J
         ledger[1] += motor[k] * rho[k]
         ledger[2] += drag * rho[k]

@@ -13,7 +13,7 @@ from ..kit.errors import BadInput, some_of
 from ..kit.timeline import NS, utc_label
 from ..telemetry.load import load_telemetry
 from ..telemetry.telemetry import Telemetry
-from .entry import Curve, Entry, Value
+from .entry import BEST, Curve, Entry, Value
 from .events import Event
 from .figures import FIGURES, Actuation, Torque, measure
 
@@ -60,7 +60,7 @@ def analyse(event: Event, craft: Craft, telemetry: Telemetry | None = None) -> E
         for basis, subject in of.items():
             value, doubt = measure(figure, subject, basis)
             values.append(value)
-            if basis in ("fused", "telemetry"):
+            if basis in BEST:
                 doubts += [f"{figure.name}: {doubt}"] if doubt else []
                 doubts += _check_doubts(figure, value)
     if event.motor_on_sigma_s:

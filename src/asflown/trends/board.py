@@ -6,9 +6,9 @@ from pathlib import Path
 
 from ..kit.errors import BadInput, some_of
 from ..kit.quantities import quantity
-from .entry import Entry
+from .entry import MOVES, Entry
 from .store import TrendStore
-from .verdicts import MOVES, Health, judge
+from .verdicts import Health, judge
 
 
 def entries_in(store: str, craft: str | None, *, curves: bool) -> tuple[list[Entry], str]:

@@ -35,13 +35,13 @@ def instants(curves: list[Curve]) -> np.ndarray:
     """Where curves are compared: from the motor's start until nearly nothing more happens, a tenth longer. [s]"""
     last = min(float(c.time_s[-1]) for c in curves)
     t = np.linspace(0.0, last, 4 * _INSTANTS)
-    past = np.cumsum(np.median([_at(c, t)[0] for c in curves], axis=0) ** 2)
+    past = np.cumsum(np.median([_at(c, t) for c in curves], axis=0) ** 2)
     stop = float(t[np.searchsorted(past, _PAST * past[-1])]) if past[-1] > 0 else last
     return np.linspace(0.0, min(1.1 * stop, last), _INSTANTS)
 
 
-def registered(curve: Curve, t: np.ndarray, onto: np.ndarray, scaled: bool) -> tuple[np.ndarray, np.ndarray]:
-    """``curve`` moved and stretched (and ``scaled``) to fit ``onto`` at the instants ``t``: (values, sigma).
+def registered(curve: Curve, t: np.ndarray, onto: np.ndarray, scaled: bool) -> np.ndarray:
+    """``curve`` moved and stretched (and ``scaled``) to fit ``onto`` at the instants ``t``.
 
     The best of a grid of shifts and stretches, then of a finer one about it."""
     best, shift, stretch = np.inf, 0.0, 1.0
@@ -49,22 +49,21 @@ def registered(curve: Curve, t: np.ndarray, onto: np.ndarray, scaled: bool) -> t
         around = (shift, stretch)
         for a in around[0] + width * _SHIFT * t[-1] * np.linspace(-1, 1, steps):
             for b in around[1] + width * _STRETCH * np.linspace(-1, 1, steps):
-                v = np.interp(a + b * t, curve.time_s, curve.values)
+                v = _at(curve, a + b * t)
                 size = _size(v, onto) if scaled else 1.0
                 miss = np.sum((size * v - onto) ** 2)
                 if miss < best:
                     best, shift, stretch = miss, a, b
-    values, sigma = _at(curve, shift + stretch * t)
-    size = _size(values, onto) if scaled else 1.0
-    return size * values, size * sigma
+    values = _at(curve, shift + stretch * t)
+    return (_size(values, onto) if scaled else 1.0) * values
 
 
 def distance(a: Curve, b: Curve) -> float:
     """How different two curves are once registered: rms difference as a share of their own rms, symmetric. []"""
     both, t = [], instants([a, b])
     for one, other in ((a, b), (b, a)):
-        onto, _ = _at(other, t)
-        moved, _ = registered(one, t, onto, scaled=False)
+        onto = _at(other, t)
+        moved = registered(one, t, onto, scaled=False)
         both.append(np.sqrt(np.mean((moved - onto) ** 2) / (0.5 * np.mean(moved**2 + onto**2))))
     return float(np.mean(both))
 
@@ -79,9 +78,9 @@ def shape_of(newest: Curve, past: list[Curve], day) -> Shape | None:
     if len(past) < FEWEST_CURVES:
         return None
     t = instants(past)
-    onto = np.median([_at(c, t)[0] for c in past], axis=0)
-    values = np.array([registered(c, t, onto, scaled=True)[0] for c in past])
-    new, _ = registered(newest, t, onto, scaled=True)
+    onto = np.median([_at(c, t) for c in past], axis=0)
+    values = np.array([registered(c, t, onto, scaled=True) for c in past])
+    new = registered(newest, t, onto, scaled=True)
     own = np.array([
         _apart(values[k], np.delete(values, k, axis=0), day[k], np.delete(day[:-1], k)) for k in range(len(past))
     ])  # fmt: skip
@@ -97,7 +96,7 @@ def shape_of(newest: Curve, past: list[Curve], day) -> Shape | None:
 def family_band(curves: list[Curve], share: float = 0.95) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(times, low, high): where a further curve of the family would run with that probability at each instant."""
     t = instants(curves)
-    values = np.array([_at(c, t)[0] for c in curves])
+    values = np.array([_at(c, t) for c in curves])
     n = len(values)
     reach = stats.t.ppf(0.5 + share / 2, n - 1) * values.std(axis=0, ddof=1) * np.sqrt(1 + 1 / n)
     return t, values.mean(axis=0) - reach, values.mean(axis=0) + reach
@@ -121,6 +120,5 @@ def _size(values, onto) -> float:
     return float(np.clip((values @ onto) / max(values @ values, 1e-300), 0.2, 5.0))
 
 
-def _at(curve: Curve, t) -> tuple[np.ndarray, np.ndarray]:
-    sigma = np.zeros_like(curve.values) if curve.sigma is None else curve.sigma
-    return np.interp(t, curve.time_s, curve.values), np.interp(t, curve.time_s, sigma)
+def _at(curve: Curve, t) -> np.ndarray:
+    return np.interp(t, curve.time_s, curve.values)

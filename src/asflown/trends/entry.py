@@ -7,6 +7,11 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+#: Kinds of actuation; entries of other kinds (wheels) have neither rests that matter nor cycles.
+MOVES = ("deploy", "stow")
+#: What a figure is judged by: the fused torque, or telemetry where the figure is not of the torque.
+BEST = ("fused", "telemetry")
+
 
 @dataclass(frozen=True)
 class Value:
@@ -62,6 +67,15 @@ class Entry:
     def value(self, figure: str, basis: str) -> Value | None:
         """The figure of that name and basis; None where it was not computed."""
         return next((v for v in self.values if (v.figure, v.basis) == (figure, basis)), None)
+
+    def best(self, figure: str) -> Value | None:
+        """The figure on the basis that it is judged by."""
+        return next((v for b in BEST if (v := self.value(figure, b)) is not None), None)
+
+    @property
+    def known(self) -> int:
+        """How many of its figures have a value, on any basis."""
+        return sum(v.value is not None for v in self.values)
 
     def curve(self, name: str) -> Curve | None:
         return next((c for c in self.curves if c.name == name), None)

@@ -24,6 +24,7 @@ from scipy.signal import find_peaks
 from ..craft.model import Mechanism
 from ..estimate.result import spread
 from ..kit.errors import BadInput
+from ..kit.plain import finite
 from ..telemetry.telemetry import Telemetry
 from .entry import Value
 from .events import Event, stall
@@ -191,7 +192,7 @@ def load_figures(path: str | Path) -> None:
 def measure(figure: FigureOfMerit, of, basis: str) -> tuple[Value, str]:
     """One figure on one basis, and its doubt; unknown where it has no answer."""
     found = figure.compute(of) or Measured(None)
-    value, sigma = (None if x is None or not np.isfinite(x) else float(x) for x in (found.value, found.sigma))
+    value, sigma = finite(found.value), finite(found.sigma)
     return Value(figure.name, basis, value, None if value is None else sigma, figure.unit), found.doubt
 
 

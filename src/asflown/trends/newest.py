@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .slope import HUBER, POWER, YEAR, Values, _mad, _scatter, _sigmas, robust_line, sizes
+from .slope import HUBER, POWER, YEAR, Values, mad, robust_line, scatter_of, sigmas_about, sizes
 
 #: Past events needed for a judgement, and draws of the noise.
 FEWEST_PAST, DRAWS = 4, 5000
@@ -59,7 +59,9 @@ def newest_of(values: Values) -> Newest | None:
     size = sizes(x[:past], before.value, x)
     # scatter that so few events cannot exclude: half of its square's standard error, where the events' own sigmas hide it
     hidden = 0.5 * np.median(before.sigma) ** 2 * np.sqrt(2 / (past - 2))
-    s = _sigmas(np.sqrt(max(_scatter(before, size[:past]) ** 2, hidden)) * size, values.sigma)  # of all, the newest too
+    s = sigmas_about(
+        np.sqrt(max(scatter_of(before, size[:past]) ** 2, hidden)) * size, values.sigma
+    )  # of all, the newest too
     floor = float(np.median(values.sigma / s))  # what the events' own sigmas alone make: the past cannot scatter less
     start, slope, scale = _line(x[:past], values.value[:past], s[:past], floor)
     expected = float(start + slope * x[-1])
@@ -85,7 +87,7 @@ def _line(x, y, s, floor):
     """A robust line and the scale of what it leaves, in units of ``s``; a single past outlier moves neither much."""
     start, slope = robust_line(x, y, s)
     z = (y - np.asarray(start)[..., None] - np.asarray(slope)[..., None] * x) / s
-    rough = np.maximum(_mad(z), 1e-300)
+    rough = np.maximum(mad(z), 1e-300)
     clipped = np.clip(z / rough[..., None], -2 * HUBER, 2 * HUBER) * rough[..., None]
     return start, slope, np.maximum(np.sqrt(np.sum(clipped**2, axis=-1) / (np.shape(z)[-1] - 2)), floor)
 

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import stats
 
 from .curves import TORQUE, distance
-from .entry import Entry
+from .entry import MOVES, Entry
 from .slope import Trend
 
 #: A rest of this long makes an actuation cold; the next one is warm when itself it comes within so long. [days]
@@ -79,7 +79,7 @@ def whole_days(rest: float) -> int:
 
 def cycles(entries: list[Entry]) -> float:
     """Full cycles used: a deploy and a stow make one."""
-    return sum(e.kind in ("deploy", "stow") for e in entries) / 2
+    return sum(e.kind in MOVES for e in entries) / 2
 
 
 def find_pairs(entries: list[Entry], kind: str = "deploy") -> list[Pair]:
@@ -100,10 +100,7 @@ def equivalence(figure: str, pairs: list[Pair], trend: Trend, margin: float = MA
     The scatter is that of all events about their trend, relative; the slope between the two dates is taken off."""
     found = []
     for p in pairs:
-        a, b = (
-            v.value if (v := e.value(figure, "fused") or e.value(figure, "telemetry")) else None
-            for e in (p.cold, p.warm)
-        )
+        a, b = (v.value if (v := e.best(figure)) is not None else None for e in (p.cold, p.warm))
         if a is not None and b is not None and a * b > 0:
             lines = trend.at(np.array([p.cold.day, p.warm.day]))
             found.append(np.log(b / a) - (np.log(lines[1] / lines[0]) if lines[0] * lines[1] > 0 else 0.0))

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..kit.errors import BadInput, some_of
 from .curves import TORQUE, distance
+from .entry import BEST
 from .newest import Newest
 from .pairs import COLD_DAYS, WARM_DAYS, Equivalence, whole_days
 from .slope import Trend
@@ -89,7 +90,7 @@ def two_record(health: Health, first: str, second: str) -> dict:
     rows = []
     for v in a.values:
         w = b.value(v.figure, v.basis)
-        if v.basis not in ("fused", "telemetry") or w is None or v.value is None or w.value is None:
+        if v.basis not in BEST or w is None or v.value is None or w.value is None:
             continue
         sigma = None if v.sigma is None or w.sigma is None else float(np.hypot(v.sigma, w.sigma))
         rows.append({
@@ -111,14 +112,24 @@ def health_record(h: Health) -> dict:
              "doubts": list(e.doubts), "provenance": e.provenance} for e in h.entries
         ],
         "figures": [figure_record(f) for f in h.figures],
-        "shape": None if h.shape is None else {
-            "distance": h.shape.distance, "usual_distance": h.shape.usual, "p_value": h.shape.p_value,
-            "p_value_all_figures": h.shape_p_adjusted,
-        },
+        "shape": shape_record(h),
         "cold_warm": cold_warm_record(h),
-        "cycles": {"used": h.cycles_used, "allowed": h.cycles_allowed},
+        "cycles": cycles_record(h),
         "doubts": list(h.doubts),
     }  # fmt: skip
+
+
+def shape_record(h: Health) -> dict | None:
+    if h.shape is None:
+        return None
+    return {
+        "distance": h.shape.distance, "usual_distance": h.shape.usual, "p_value": h.shape.p_value,
+        "p_value_all_figures": h.shape_p_adjusted,
+    }  # fmt: skip
+
+
+def cycles_record(h: Health) -> dict:
+    return {"used": h.cycles_used, "allowed": h.cycles_allowed}
 
 
 def _slow_power(t: Trend) -> dict:

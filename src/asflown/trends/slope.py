@@ -69,7 +69,7 @@ class Trend:
     @property
     def sigmas(self) -> np.ndarray:
         """One sigma of every event about the line."""
-        return _sigmas(self.scatter * sizes(self.values.share, self.values.value), self.values.sigma)
+        return sigmas_about(self.scatter * sizes(self.values.share, self.values.value), self.values.sigma)
 
     def power(self, percent: float) -> float:
         """Probability that a change of that size, first to last event, is told from none at 5 %."""
@@ -112,11 +112,11 @@ def trend_of(values: Values) -> Trend:
     u = values.share
     one = np.ones_like(u)
     size = sizes(u, y)
-    scatter = _scatter(values, size)
-    s = _sigmas(scatter * size, values.sigma)
+    scatter = scatter_of(values, size)
+    s = sigmas_about(scatter * size, values.sigma)
     start, rise = (float(x) for x in robust_line(u, y, s))
     left = y - start - rise * u
-    scale = _mad(left / s)
+    scale = mad(left / s)
     residual = float(np.median(s)) * float(np.sqrt(np.sum(_psi(left / s, max(scale, 1e-300)) ** 2) / (len(y) - 2)))
     if scale == 0 or np.max(np.abs(left)) <= 1e-9 * np.max(np.abs(y)):  # all on one line: nothing to shuffle
         exact = abs(rise) > 1e-9 * np.max(np.abs(y))
@@ -168,7 +168,7 @@ def robust_line(x, y, s, rounds: int = 12) -> tuple[np.ndarray, np.ndarray]:
         (y[..., pair[1]] - y[..., pair[0]])[..., keep] / apart[keep], axis=-1
     )  # Theil and Sen's, to start
     start = np.median(y - slope[..., None] * x, axis=-1)
-    scale = _mad((y - start[..., None] - slope[..., None] * x) / s)[..., None]
+    scale = mad((y - start[..., None] - slope[..., None] * x) / s)[..., None]
     floor = np.maximum(scale, 1e-300)
     for _ in range(rounds):
         z = np.abs(y - start[..., None] - slope[..., None] * x) / s / floor
@@ -226,7 +226,7 @@ def _psi(z, scale):
     return np.clip(z / scale, -HUBER, HUBER) * scale
 
 
-def _mad(z) -> np.ndarray:
+def mad(z) -> np.ndarray:
     """Standard deviation from the median size, corrected for a line having been fitted."""
     n = np.shape(z)[-1]
     return np.median(np.abs(z), axis=-1) / 0.6745 * np.sqrt(n / max(n - 2, 1))
@@ -241,17 +241,17 @@ def sizes(x, y, at=None) -> np.ndarray:
     return np.clip((start + slope * where) / np.mean(start + slope * x), 0.4, 2.5)
 
 
-def _sigmas(scatter, sigma) -> np.ndarray:
+def sigmas_about(scatter, sigma) -> np.ndarray:
     total = np.sqrt(scatter**2 + sigma**2)
     return np.where(total > 0, total, 1.0)
 
 
-def _scatter(values: Values, size) -> float:
+def scatter_of(values: Values, size) -> float:
     """Event-to-event scatter beyond the events' own sigma: sum of psi(r / s)^2 = N - 2  (Paule and Mandel 1982)."""
     u, y, sigma = values.share, values.value, values.sigma
 
     def excess(tau):
-        s = _sigmas(tau * size, sigma)
+        s = sigmas_about(tau * size, sigma)
         start, slope = robust_line(u, y, s)
         z = (y - start - slope * u) / s
         return np.sum(np.clip(z, -3, 3) ** 2) - (len(y) - 2)
@@ -275,7 +275,7 @@ def _p(y, s, nuisance, direction, scale, orders) -> float:
         m = (w * g) @ z / ((w * g) @ g)
     left = z - m * g
     psi = _psi(
-        left, max(scale, float(_mad(left)))
+        left, max(scale, float(mad(left)))
     )  # far from the right hypothesis everything is large, nothing an outlier
     chance = np.abs(psi[orders] @ d)
     return float((1 + np.sum(chance >= abs(d @ psi) * (1 - 1e-12))) / (1 + len(orders)))

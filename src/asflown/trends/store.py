@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import math
 import re
 import threading
 import zipfile
@@ -19,7 +18,7 @@ from sqlalchemy import Connection, Engine, exists, func, insert, inspect, select
 from sqlalchemy.engine import URL
 
 from ..kit.errors import BadInput, some_of
-from ..kit.plain import plain
+from ..kit.plain import finite, plain
 from .entry import Curve, Entry, Value
 from .place import label, plainly, reach, switch_to_wal, url_of, wait_for_turn
 from .schema import CURVE, ENTRY, HEAD, VALUE, VERSION_TABLE
@@ -232,9 +231,5 @@ def _ready(entry: Entry) -> Entry:
         raise BadInput("an entry without craft or event", remedy="Name both.")
     if not _DATE.fullmatch(entry.date):  # entries are put in order by it
         raise BadInput(f"{where} has the date {entry.date!r}", remedy="Give it in UTC, as 2015-09-29T00:00:00.")
-    values = tuple(replace(v, value=_finite(v.value), sigma=_finite(v.sigma)) for v in entry.values)
+    values = tuple(replace(v, value=finite(v.value), sigma=finite(v.sigma)) for v in entry.values)
     return replace(entry, values=values, doubts=tuple(entry.doubts), provenance=plain(entry.provenance))
-
-
-def _finite(number: float | None) -> float | None:
-    return None if number is None or not math.isfinite(number) else float(number)

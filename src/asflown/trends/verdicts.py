@@ -16,7 +16,7 @@ import numpy as np
 from ..kit.errors import BadInput, some_of
 from .change import FEW, Step, step_of
 from .curves import TORQUE, Shape, shape_of
-from .entry import Entry
+from .entry import BEST, MOVES, Entry
 from .figures import END_WITHIN, FIGURES
 from .newest import FEWEST_PAST, Newest, newest_of
 from .pairs import (
@@ -42,8 +42,6 @@ HORIZON_YEARS = 5.0
 _CYCLES_WATCHED = 0.8
 ORDER = ("pass", "watch", "alarm")
 SHAPE = "shape of the torque"
-#: Kinds of actuation; entries of other kinds (wheels) have neither rests that matter nor cycles.
-MOVES = ("deploy", "stow")
 
 
 @dataclass(frozen=True)
@@ -189,8 +187,8 @@ def _figures_of(entries: list[Entry]) -> list[tuple[str, str]]:
 def _judged(f: FigureHealth) -> bool:
     declared = FIGURES.get(f.figure)
     if declared is None:  # a wheel's drag, or a user's: those with an uncertainty, not counts
-        return f.basis in ("fused", "telemetry") and any(r.sigma is not None for r in f.rows)
-    return f.basis in ("fused", "telemetry") and declared.judged
+        return f.basis in BEST and any(r.sigma is not None for r in f.rows)
+    return f.basis in BEST and declared.judged
 
 
 def _figure(entries: list[Entry], name: str, basis: str) -> FigureHealth:

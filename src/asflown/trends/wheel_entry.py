@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 from ..craft.model import Craft
 from ..estimate.wheel_result import WheelDrag, WheelsResult
 from ..kit.errors import BadInput
+from ..kit.plain import finite
 from ..kit.timeline import utc_label
 from ..telemetry.telemetry import Telemetry
 from .entry import Entry, Value
@@ -47,8 +46,8 @@ def _values(w: WheelDrag):
         torque, per_rate = "rad/s^2, per unit spin inertia", "1/s, per unit spin inertia"
 
     def of(figure: str, value, sigma, unit: str) -> Value:
-        known = value is not None and math.isfinite(value)
-        return Value(f"{figure}_{w.name}", _BASIS, float(value) if known else None, sigma if known else None, unit)
+        value = finite(value)
+        return Value(f"{figure}_{w.name}", _BASIS, value, None if value is None else sigma, unit)
 
     yield of("coulomb_drag", f and f.coulomb, f and f.sigma_coulomb, torque)
     yield of("viscous_drag", f and f.viscous, f and f.sigma_viscous, per_rate)
