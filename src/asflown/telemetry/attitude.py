@@ -24,9 +24,10 @@ OFF_SCALE = 1.25
 TOO_FAST = 10.0  # times the body rate: no loop does this, a unit does (57 or 1000)
 
 _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
-_UNITS = {180 / np.pi: "deg/s labelled rad/s", 1e3: "mrad/s labelled rad/s", 30 / np.pi: "rpm labelled rad/s",
-          np.pi / 180: "rad/s labelled deg/s", 1e-3: "rad/s labelled mrad/s", 1e6: "microrad/s labelled rad/s",
-          648_000 / np.pi: "arcsec/s labelled rad/s"}  # fmt: skip
+#: What a rate's scale betrays.
+MISTAKEN_UNITS = {180 / np.pi: "deg/s labelled rad/s", 1e3: "mrad/s labelled rad/s", 30 / np.pi: "rpm labelled rad/s",
+                  np.pi / 180: "rad/s labelled deg/s", 1e-3: "rad/s labelled mrad/s", 1e6: "microrad/s labelled rad/s",
+                  648_000 / np.pi: "arcsec/s labelled rad/s"}  # fmt: skip
 
 
 def check_attitude(telemetry: Telemetry, readings: dict[str, tuple[np.ndarray, np.ndarray]] | None = None) -> Telemetry:
@@ -158,7 +159,7 @@ def _scales(telemetry: Telemetry, rate: np.ndarray, w: np.ndarray) -> Telemetry:
     scale = common / float(np.sum(rate**2))
     if 1 / OFF_SCALE < scale < OFF_SCALE:
         return telemetry
-    near = [u for f, u in _UNITS.items() if abs(np.log(scale / f)) < np.log(OFF_SCALE)]
+    near = [u for f, u in MISTAKEN_UNITS.items() if abs(np.log(scale / f)) < np.log(OFF_SCALE)]
     guess = f": are they {near[0]}?" if near else ": check the unit of the body rates"
     names = ", ".join(f"body_rate_{a}" for a in AXES)
     return _doubted(telemetry, f"{names}: {scale:.4g} times the rates of the quaternion{guess}")
