@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from asflown.kit.errors import BadInput
-from asflown.kit.regression import local_polynomial, loess, noise_sigma
+from asflown.kit.regression import local_polynomial, loess, memory, noise_sigma
 
 
 def reference(x, y, span):
@@ -99,3 +99,15 @@ def test_law_the_order_of_the_instants_does_not_matter():
     mixed = local_polynomial(t, y, t[shuffled], degree=2, neighbors=39)
     assert np.allclose(mixed.derivatives, straight.derivatives[:, shuffled], rtol=0, atol=1e-14)
     assert np.allclose(mixed.gain, straight.gain[shuffled], rtol=0, atol=1e-14)
+
+
+def test_memory_of_coloured_noise():
+    """(1 + keep) / (1 - keep) samples are worth one."""
+    for keep in (0.0, 0.5, 0.8):
+        found = []
+        for seed in range(30):
+            e = np.random.default_rng(seed).standard_normal(4000)
+            for k in range(1, len(e)):
+                e[k] += keep * e[k - 1]
+            found.append(memory(e))
+        assert np.mean(found) == pytest.approx((1 + keep) / (1 - keep), rel=0.15)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..kit.regression import memory
+
 #: A spike stands out by this many robust sigma.
 _SPIKE = 6.0
 #: Samples beyond this many robust sigma do not count for the line.
@@ -42,23 +44,10 @@ def robust_line(u, y) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
             break
         used = again
     count = int(used.sum())
-    variance = float(np.sum(left[used] ** 2)) / max(count - 2, 1) * _memory(left[used])
+    variance = float(np.sum(left[used] ** 2)) / max(count - 2, 1) * memory(left[used])
     of_slope = (100 * middle / centre) ** 2 if narrow else variance / spread
     J = np.array([[1.0, -centre], [0.0, 1.0]])
     return np.array([middle - slope * centre, slope]), J @ np.diag([variance / count, of_slope]) @ J.T, used
-
-
-def _memory(left) -> float:
-    """How many samples make one: 1 + 2 sum of autocorrelations, up to the first that noise would give."""
-    n, total, power = len(left), 1.0, float(left @ left)
-    if n < 8 or power == 0:
-        return 1.0
-    for k in range(1, n // 4):
-        r = float(left[:-k] @ left[k:]) / power
-        if r < 2 / np.sqrt(n):
-            break
-        total += 2 * r
-    return total
 
 
 def find_spikes(time_s, excess, drag, moving, used) -> list[tuple[float, float, float, float]]:

@@ -143,6 +143,19 @@ def noise_sigma(t, y, *, degree: int, half_width: float) -> float:
     return float(1.4826 * np.median(np.abs(scaled)))
 
 
+def memory(left) -> float:
+    """How many successive residuals are worth one that stands alone: 1 + 2 sum of autocorrelations, up to the first that noise would give."""
+    n, total, power = len(left), 1.0, float(left @ left)
+    if n < 8 or power == 0:
+        return 1.0
+    for k in range(1, n // 4):
+        r = float(left[:-k] @ left[k:]) / power
+        if r < 2 / np.sqrt(n):
+            break
+        total += 2 * r
+    return total
+
+
 def _lattice_step(t: np.ndarray) -> float | None:
     """The step of the even lattice that all samples lie on, or None where there is none."""
     if len(t) < 2:

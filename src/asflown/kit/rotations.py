@@ -37,6 +37,20 @@ def rates_between(time_s, q_NB) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(time_s[:-1]) + dt / 2, step / dt[:, None]
 
 
+def turned_by(time_s, omega_B) -> Rotation:
+    """Attitudes (N) from body rates (N, 3) alone, body to the axes it had at the first instant: rates linear between samples.
+
+    Products of neighbours, then of neighbours' products: each attitude is the product of all steps before it."""
+    w, dt = np.asarray(omega_B, float), np.diff(time_s)
+    steps = 0.5 * (w[1:] + w[:-1]) * dt[:, None]
+    r = Rotation.from_rotvec(np.vstack([np.zeros(3), steps]))
+    reach = 1
+    while reach < len(w):
+        r = Rotation.concatenate([r[:reach], r[:-reach] * r[reach:]])
+        reach *= 2
+    return r
+
+
 def lvlh_to_inertial(position_N, velocity_N) -> Rotation:
     """LVLH axes (z to the planet, y against the orbit normal, x along the velocity) to inertial.
 
