@@ -19,6 +19,8 @@ _PUBLIC = {
     "disturbance_torque": "asflown.estimate.torque",
     "TorqueResult": "asflown.estimate.result",
     "compare_torques": "asflown.estimate.compare",
+    "external_torque": "asflown.estimate.external_torque",
+    "ExternalTorque": "asflown.estimate.external_result",
     "wheel_drag": "asflown.estimate.wheel_drag",
     "WheelsResult": "asflown.estimate.wheel_result",
     "Scenario": "asflown.sim.scenario",
@@ -51,6 +53,8 @@ if TYPE_CHECKING:
     from asflown.craft.load import built_in_crafts, load_craft
     from asflown.craft.model import Craft
     from asflown.estimate.compare import compare_torques
+    from asflown.estimate.external_result import ExternalTorque
+    from asflown.estimate.external_torque import external_torque
     from asflown.estimate.result import TorqueResult
     from asflown.estimate.torque import disturbance_torque
     from asflown.estimate.wheel_drag import wheel_drag
