@@ -237,6 +237,25 @@ class FlexibleMode(_Data):
     source: str = ""
 
 
+class Pendulum(_Data):
+    """Propellant that sloshes: a mass on a rod, held to the middle by surface tension."""
+
+    name: str
+    mass: Kilogram = Field(gt=0)  # what swings of it
+    pivot: MetreVector  # from the craft's centre of mass
+    direction: Direction  # from the pivot to the mass at rest
+    length: Metre = Field(gt=0)
+    frequency: Hertz = Field(gt=0)
+    damping: float = Field(ge=0)
+    source: str = ""
+
+    @model_validator(mode="after")
+    def _directed(self):
+        if np.linalg.norm(self.direction) == 0:
+            raise ValueError(f"slosh {self.name!r}: the direction has no length")
+        return self
+
+
 class Accelerometer(_Data):
     axis: Direction
     scale: MetrePerSecond  # per count
@@ -271,6 +290,7 @@ class Craft(_Data):
     thrust_history: tuple[ThrustHistory, ...] = ()
     mechanisms: tuple[Mechanism, ...] = ()
     flexible_modes: tuple[FlexibleMode, ...] = ()
+    slosh: tuple[Pendulum, ...] = ()
     accelerometer: Accelerometer | None = None
     aerodynamics: Aerodynamics | None = None
     center_of_mass: MetreVector | None = None
@@ -278,7 +298,7 @@ class Craft(_Data):
 
     @model_validator(mode="after")
     def _consistent(self):
-        for things in (self.thrusters, self.mechanisms, self.flexible_modes):
+        for things in (self.thrusters, self.mechanisms, self.flexible_modes, self.slosh):
             names = [t.name for t in things]
             if len(set(names)) != len(names):
                 raise ValueError(f"a name is used twice: {some_of(names)}")

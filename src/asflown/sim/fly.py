@@ -17,6 +17,7 @@ from .controllers import wheel_loop
 from .cover import MovingPart, motor_telemetry, moving_part
 from .disturbances import profile_peaks, torque_table
 from .faults import coasting, drag_table
+from .modes import swinging
 from .plant import Errors, Loop, Plant, fly_cycles, moving_part_history
 from .sampling import axes_of, telemetry_of
 from .scenario import Scenario, load_scenario
@@ -148,15 +149,7 @@ def _check_flyable(scenario: Scenario, now: CraftAt) -> None:
 
 
 def _plant(scenario: Scenario, now: CraftAt, part: MovingPart | None) -> Plant:
-    modes = now.craft.flexible_modes if scenario.flexible else ()
-    natural = 2 * np.pi * np.array([m.frequency for m in modes])
-    coupling = np.array([m.coupling for m in modes]).reshape(-1, 3)
-    left = np.linalg.eigvalsh(now.inertia_kgm2 - coupling.T @ coupling)[0]
-    if left <= 0:
-        raise BadInput(
-            "the flexible modes carry more inertia than the craft has",
-            remedy="Lower their coupling: the sum of delta delta^T must stay below the inertia tensor.",
-        )
+    coupling, natural, damping = swinging(scenario, now)
     drag = [(w.drag.viscous, w.drag.coulomb, w.drag.stiction) if scenario.friction else (0.0,) * 3 for w in now.wheels]
     times, torques = torque_table(scenario)
     spike_times, spikes = drag_table(scenario, tuple(w.name for w in now.wheels))
@@ -167,7 +160,7 @@ def _plant(scenario: Scenario, now: CraftAt, part: MovingPart | None) -> Plant:
         spin_inertia=np.array([w.spin_inertia for w in now.wheels], float),
         drag=np.array(drag, float),
         coupling=coupling,
-        mode_damping=2 * np.array([m.damping for m in modes]) * natural,
+        mode_damping=2 * damping * natural,
         mode_stiffness=natural**2,
         torque_time=times,
         torque=np.ascontiguousarray(torques),

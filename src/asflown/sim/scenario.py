@@ -259,6 +259,8 @@ class Scenario(Plan):
     noise: NoiseName = "nominal"
     substeps: int = Field(default=4, ge=1, le=1000)  # Runge-Kutta steps a control cycle
     flexible: bool = False
+    slosh: bool = False
+    craft_mass: Kilogram | None = Field(default=None, gt=0)  # of all of it, propellant too
     friction: bool = False
     gyro_bias: RateVector = (0.0, 0.0, 0.0)  # what calibration left over
     wheel_rates: _by_name("rad/s") = Field(default_factory=dict)  # type: ignore[valid-type]
@@ -278,6 +280,13 @@ class Scenario(Plan):
         except BadInput as why:
             raise ValueError(f"epoch: {why.what}") from None
         return self
+
+    def known_mass(self, who: str) -> float:
+        """The whole craft's. [kg]  Raises BadInput for ``who`` needs it where it is not given."""
+        mass = self.craft_mass or (self.cover.craft_mass if self.cover else None)
+        if mass is None:
+            raise BadInput(f"{who} needs the mass of the craft", remedy='Give the scenario a craft_mass = "2500 kg".')
+        return mass
 
     @property
     def epoch_ns(self) -> int:
