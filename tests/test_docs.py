@@ -74,8 +74,22 @@ def test_telemetry_pages_examples_are_read(tmp_path):
 
 def test_simulator_page_lists_every_scenario_key():
     models = (scenario.Scenario, scenario.Triangles, scenario.Constant, scenario.Table, scenario.Plume, scenario.Slew,
-              scenario.Coast, scenario.DragSpike, scenario.CoverMotion, scenario.Controller, scenario.Sampling, scenario.Gap)  # fmt: skip
-    tables = {"slews", "coasts", "drag_spikes", "cover", "controller", "telemetry", "gaps"}  # named in the first column
+              scenario.Coast, scenario.DragSpike, scenario.CoverMotion, scenario.Controller, scenario.Sampling, scenario.Gap,
+              scenario.ThrusterUse, scenario.CatalystBeds, scenario.ThrusterFault, scenario.WheelBias, scenario.Burn)  # fmt: skip
+    tables = {
+        "slews",
+        "coasts",
+        "drag_spikes",
+        "cover",
+        "controller",
+        "telemetry",
+        "gaps",
+        "thrusters",
+        "catalyst_beds",
+        "thruster_faults",
+        "wheel_biases",
+        "burns",
+    }  # named in the first column
     fields = {k for m in models for k in m.model_fields} - tables
     text = section(page("simulator.md"), "Scenario keys")
     assert keys_in(text) == fields

@@ -144,13 +144,24 @@ np.save("OUT", np.hstack([f.truth.body_rate_rad_s, f.truth.wheel_rate_rad_s, f.t
 """
 
 
-def test_law_without_numba_the_same_flight_within_rounding(tmp_path):
+WITH_THRUSTERS = """
+import numpy as np
+from asflown.sim.fly import fly
+bias = [{"start": "0 s", "stop": "2 s", "rates": {"RWA1": "30 rpm", "RWA4": "30 rpm"}}]
+f = fly("wheel-bias-fsds", duration="6 s", wheel_biases=bias, thrusters={"deadband": "30 30 30 urad", "catalyst_beds": {}})
+assert f.truth.thrusters.pulses[-1].sum() > 3
+np.save("OUT", np.hstack([f.truth.body_rate_rad_s, f.truth.wheel_rate_rad_s, f.truth.attitude]))
+"""
+
+
+@pytest.mark.parametrize("short", [SHORT, WITH_THRUSTERS])
+def test_law_without_numba_the_same_flight_within_rounding(tmp_path, short):
     """Compiled code may fuse and reorder: agreement to 1e-9 of each column's size, not to the bit."""
     made = []
     for switch in ("0", "1"):
         path = tmp_path / f"{switch}.npy"
         subprocess.run(
-            [sys.executable, "-c", SHORT.replace("OUT", str(path))],
+            [sys.executable, "-c", short.replace("OUT", str(path))],
             env=os.environ | {"NUMBA_DISABLE_JIT": switch}, check=True,
         )  # fmt: skip
         made.append(np.load(path))

@@ -177,6 +177,17 @@ class ThrustHistory(_Data):
     source: str = ""
 
 
+class ThrusterController(_Data):
+    """Thrusters fired outside a deadband of e + lead x rate error, a whole control cycle at a time."""
+
+    lead: Second = Field(gt=0)
+    hysteresis: Radian = Field(default=0.0, ge=0)  # firing ends this far inside
+    approach_rate: RadianPerSecond = Field(gt=0)  # at most, back to the deadband
+    pairs: dict[Literal["+x", "-x", "+y", "-y", "+z", "-z"], tuple[str, ...]]  # which turn the craft that way
+    burn: tuple[str, ...] = ()  # which change its velocity
+    source: str = ""
+
+
 class RateFilter(_Data):
     """Identical second-order low-pass sections in cascade."""
 
@@ -274,6 +285,7 @@ class Alternative(_Data):
     """A named set of other values found in print."""
 
     spin_inertia: dict[str, SpinInertia] = Field(default_factory=dict)
+    inertia: InertiaElements | None = None  # in place of all history
     source: str = ""
 
 
@@ -288,6 +300,7 @@ class Craft(_Data):
     wheel_controller: WheelController | None = None
     thrusters: tuple[Thruster, ...] = ()
     thrust_history: tuple[ThrustHistory, ...] = ()
+    thruster_controller: ThrusterController | None = None
     mechanisms: tuple[Mechanism, ...] = ()
     flexible_modes: tuple[FlexibleMode, ...] = ()
     slosh: tuple[Pendulum, ...] = ()
@@ -308,6 +321,12 @@ class Craft(_Data):
                 raise ValueError(
                     f"wheel {name!r} is described twice for one date: part them by valid_from and valid_to"
                 )
+        if self.thruster_controller is not None:
+            used = {n for pair in self.thruster_controller.pairs.values() for n in pair} | {
+                *self.thruster_controller.burn
+            }
+            if unknown := used - {t.name for t in self.thrusters}:
+                raise ValueError(f"thruster_controller names {some_of(unknown)}, which is no thruster")
         relative = {w.spin_inertia is None for w in self.wheels}
         if len(relative) > 1:
             raise ValueError("either every wheel's spin inertia is known or none is")
@@ -329,9 +348,9 @@ class Craft(_Data):
     def with_alternative(self, name: str) -> Craft:
         if name not in self.alternatives:
             raise BadInput(f"{self.name} has no alternative {name!r}", remedy=f"It has: {some_of(self.alternatives)}.")
-        other = self.alternatives[name].spin_inertia
+        other, inertia = self.alternatives[name].spin_inertia, self.alternatives[name].inertia
         wheels = tuple(w.model_copy(update={"spin_inertia": other.get(w.name, w.spin_inertia)}) for w in self.wheels)
-        return self.model_copy(update={"wheels": wheels})
+        return self.model_copy(update={"wheels": wheels}).with_inertia(inertia)
 
     def with_inertia(self, elements, cm=None) -> Craft:
         """The same craft with one tensor for all dates, used as given."""
@@ -346,6 +365,18 @@ class Craft(_Data):
         if cm is not None:
             changes["center_of_mass"] = tuple(cm)
         return self.model_copy(update=changes)
+
+    def thrust_at(self, tai_ns: int) -> float:
+        """Steady thrust of each thruster as predicted for a date: straight lines in time, held outside. [N]
+
+        Raises BadInput for a craft whose thrust is nowhere given."""
+        known = sorted(self.thrust_history, key=lambda h: h.date)
+        if not known:
+            raise BadInput(
+                f"the thrust of {self.name} is not known",
+                remedy="Give its file a [[thrust_history]], or say the thrust.",
+            )
+        return float(np.interp(float(tai_ns), [float(h.date) for h in known], [h.thrust for h in known]))
 
     def at(self, tai_ns: int | None) -> CraftAt:
         """The craft on a date (None: the latest known state)."""

@@ -22,6 +22,14 @@ from .plant import Errors, Loop, Plant, fly_cycles, moving_part_history
 from .sampling import axes_of, telemetry_of
 from .scenario import Scenario, load_scenario
 from .sensors import NOISE, STAR_TRACKER_PERIOD_S, Estimator, normal
+from .thrusters import (
+    ThrusterTruth,
+    accelerometer_reading,
+    thrust_doubts,
+    thruster_readings,
+    thruster_truth,
+    thrusters_of,
+)
 from .write import write_flight
 
 __all__ = ["Flight", "Truth", "fly", "write_flight"]
@@ -35,7 +43,7 @@ class Truth:
     """What really happened, at the control instants from the epoch on; body axes unless named otherwise."""
 
     time_s: np.ndarray  # (N,)
-    torque_Nm: np.ndarray  # (N, 3), disturbance: external torque, and the reaction of a moving part
+    torque_Nm: np.ndarray  # (N, 3), disturbance: external torque, leaks, and the reaction of a moving part
     attitude: np.ndarray  # (N, 4), body to inertial
     body_rate_rad_s: np.ndarray  # (N, 3)
     wheel_rate_rad_s: np.ndarray  # (N, wheels), relative to the body
@@ -48,6 +56,7 @@ class Truth:
     mode_amplitude: np.ndarray  # (N, modes), hybrid coordinates [kg(1/2) m]
     mode_rate: np.ndarray  # (N, modes)
     ledger_J: np.ndarray  # (N, 4): work by the external torque, by the motors, lost in bearings, in modes
+    thrusters: ThrusterTruth | None
     cover_angle_rad: np.ndarray | None  # (N,)
     peaks: tuple[tuple[float, float, str], ...]  # (time [s], torque [N m], axis) of the injected profile
 
@@ -103,10 +112,11 @@ def fly(scenario, *, craft=None, seed: int | None = None, noise: str | None = No
     errors = _errors(scenario, loop, len(times), len(now.wheels))
     names = tuple(w.name for w in now.wheels)
     x = _start(scenario, now, plant, q_c[0])
-    record = np.zeros((len(times), len(x) + 18 + 3 * len(now.wheels)))
+    thrusters = thrusters_of(scenario, now, times, loop.period)
+    record = np.zeros((len(times), len(x) + 18 + 3 * len(now.wheels) + 3 * len(thrusters.delay)))
     tell(f"flying {scenario.name}: {scenario.settle + scenario.duration:g} s in {len(times)} control cycles")
     off = coasting(scenario, names, times)
-    flown, full = fly_cycles(plant, loop, errors, off, q_c, w_c, alpha_c, times[0], x, record)
+    flown, full = fly_cycles(plant, loop, errors, thrusters, off, q_c, w_c, alpha_c, times[0], x, record)
     if flown <= before:
         raise BadInput(
             f"wheel {now.wheels[full].name} is at its rate limit before the recording starts",
@@ -123,12 +133,14 @@ def fly(scenario, *, craft=None, seed: int | None = None, noise: str | None = No
         ended = f"wheel {now.wheels[full].name} at its rate limit at {times[-1]:g} s"
     tell(ended)
 
-    columns = _Columns(len(now.wheels), plant)
-    truth = _truth(rows, times, columns, plant, now, scenario, part)
+    columns = _Columns(len(now.wheels), plant, len(thrusters.delay))
+    fired = thruster_truth(rows, columns, thrusters, now.craft, loop.period, before) if scenario.thrusters else None
+    truth = _truth(rows, times, columns, plant, now, scenario, part, fired)
     command = (w_c[before:flown], q_c[before:flown])
     readings = _readings(rows, columns, truth, command, now, scenario, part)
     telemetry = telemetry_of(readings, scenario, loop.period, scenario.seed, scenario.name)
-    return Flight(telemetry, truth, scenario, craft, now.inertia_kgm2, names, scenario.seed, ended, now.doubts)
+    doubts = now.doubts + thrust_doubts(scenario, craft)
+    return Flight(telemetry, truth, scenario, craft, now.inertia_kgm2, names, scenario.seed, ended, doubts)
 
 
 def _check_flyable(scenario: Scenario, now: CraftAt) -> None:
@@ -140,6 +152,7 @@ def _check_flyable(scenario: Scenario, now: CraftAt) -> None:
         )
     asked = [("wheel_rates", n) for n in scenario.wheel_rates]
     asked += [("a coast", c.wheel) for c in scenario.coasts] + [("a drag spike", d.wheel) for d in scenario.drag_spikes]
+    asked += [("a wheel bias", name) for b in scenario.wheel_biases for name in b.rates]
     for what, name in asked:
         if name not in names:
             raise BadInput(
@@ -202,18 +215,19 @@ def _errors(scenario: Scenario, loop: Loop, cycles: int, wheels: int) -> Errors:
 class _Columns:
     """Which columns of the record hold what (plant.fly_cycles)."""
 
-    def __init__(self, n: int, plant: Plant):
+    def __init__(self, n: int, plant: Plant, j: int):
         m = len(plant.mode_damping)
         widths = {"attitude": 4, "rate": 3, "wheel_rate": n, "mode": m, "mode_rate": m, "ledger": 4, "estimation_error": 3,
                   "attitude_error": 3, "rate_estimate": 3, "controller_rate_error": 3, "control_torque": 3,
-                  "motor_torque": n, "drag_estimate": n, "wheel_reading": n, "outside": 3}  # fmt: skip
+                  "motor_torque": n, "drag_estimate": n, "wheel_reading": n, "outside": 3, "on": j, "thrust": j,
+                  "impulse": j}  # fmt: skip
         at = 0
         for name, width in widths.items():
             setattr(self, name, slice(at, at + width))
             at += width
 
 
-def _truth(rows, times, columns, plant: Plant, now: CraftAt, scenario: Scenario, part) -> Truth:
+def _truth(rows, times, columns, plant: Plant, now: CraftAt, scenario: Scenario, part, fired) -> Truth:
     rate, wheel_rate = rows[:, columns.rate], rows[:, columns.wheel_rate]
     stored = wheel_rate * plant.spin_inertia @ plant.wheel_axes
     torque = np.zeros_like(rate)
@@ -225,6 +239,8 @@ def _truth(rows, times, columns, plant: Plant, now: CraftAt, scenario: Scenario,
     if part is not None:
         angle, momentum, reaction = moving_part_history(times, np.ascontiguousarray(rate), plant)
         H, torque = H + momentum, torque + reaction
+    if fired is not None:
+        torque = torque + fired.leak_N @ fired.arms_m
     attitude = rows[:, columns.attitude]
     return Truth(
         time_s=times,
@@ -241,6 +257,7 @@ def _truth(rows, times, columns, plant: Plant, now: CraftAt, scenario: Scenario,
         mode_amplitude=rows[:, columns.mode],
         mode_rate=rows[:, columns.mode_rate],
         ledger_J=rows[:, columns.ledger] - rows[0, columns.ledger],
+        thrusters=fired,
         cover_angle_rad=None if part is None else part.stowed + angle,
         peaks=tuple(profile_peaks(scenario)),
     )
@@ -268,6 +285,10 @@ def _readings(rows, columns, truth: Truth, command, now: CraftAt, scenario: Scen
     readings |= axes_of("wheel_momentum", momentum, AXES)
     if scenario.controller.friction_compensation:
         readings |= axes_of("wheel_drag_torque", rows[:, columns.drag_estimate], wheels)
+    if truth.thrusters is not None:
+        readings |= thruster_readings(truth.thrusters)
+        if scenario.telemetry.accelerometer_count:
+            readings |= accelerometer_reading(truth.thrusters, scenario, now.craft, truth.time_s)
     if part is not None and scenario.cover is not None:
         readings |= motor_telemetry(scenario.cover, part, truth.time_s, truth.cover_angle_rad - part.stowed)
     return readings

@@ -12,6 +12,9 @@ Momentum about the centre of mass, body axes, wheel rates rho relative to the bo
 I holds the wheels as if they did not spin, and the moving part where it is; h_rel is the moving
 part's momentum relative to the body.  Wheel and mode accelerations are eliminated exactly, which
 leaves a 3 x 3 system for w_dot.
+
+Thrusters push from outside.  Each is a delay and two first-order lags (001 section V), so its impulse over
+any step is known exactly, and the step gets that impulse as a constant torque.
 """
 
 from __future__ import annotations
@@ -24,6 +27,8 @@ from ..kit.compiled import jit
 
 #: Coulomb drag changes sign over this rate, for a step in it cannot be integrated. [rad/s]
 DRAG_REVERSAL_RATE = 0.02
+#: Under thruster control a wheel's rate is brought to the one ordered with this gain. Assumed. [1/s]
+WHEEL_RATE_GAIN = 0.5
 #: Stiction has fallen to 1/e of its excess over Coulomb drag at this rate (Stribeck). [rad/s]
 STRIBECK_RATE = 0.5
 
@@ -81,6 +86,30 @@ class Errors(NamedTuple):
     star_tracker_every: int  # cycles
     star_tracker_gain: float
     tachometer: np.ndarray  # (N, n)
+
+
+class Thrusters(NamedTuple):
+    """Thrusters and what is ordered of them; no rows where a flight has none.  N counts cycles, j thrusters."""
+
+    in_control: bool  # they hold the attitude, and the wheels' rates are ordered
+    arms: np.ndarray  # (j, 3), torque about the centre of mass per newton [m]
+    steady: np.ndarray  # (N, j), what a pulse that starts in this cycle rises to [N]
+    leak: np.ndarray  # (N, j), thrust whatever is ordered [N]
+    delay: np.ndarray  # (j,), from an order to the valve's moving; shorter than a cycle [s]
+    rise: np.ndarray  # (2, j), time constants of a hot and of a cold catalyst bed [s]
+    fall: np.ndarray  # (2, j)
+    heating: float  # time constants of the beds themselves, firing and not [s]
+    cooling: float
+    serves: np.ndarray  # (j, 3): 1 or -1 where a thruster is fired for torque about that axis, else 0
+    lead: float  # seconds of rate that count as angle
+    approach_rate: float  # back to the deadband from far away [rad/s]
+    hysteresis: float  # how far inside the deadband firing ends [rad]
+    deadband: np.ndarray  # (1 + b, 3), between burns and in each of them [rad]
+    burn_start: np.ndarray  # (b,), cycle
+    burn_on_time: np.ndarray  # (b,), over all that burn, after which the burn is over [s]
+    burns: np.ndarray  # (j,) bool, fired in a burn unless the attitude forbids
+    spin_order: np.ndarray  # (N, n), rates the wheels are on their way to; nan: stay [rad/s]
+    spin_cycles: np.ndarray  # (N, n), how many cycles are left for it
 
 
 @jit
@@ -305,12 +334,63 @@ def _attitude_error(q, offset, q_c, out):
 
 
 @jit
-def fly_cycles(plant, loop, errors, coasting, q_c, w_c, alpha_c, first_time, x, record):
+def settle(thrust, towards, lag, duration):
+    """Thrust after a first-order approach, and its impulse on the way. [N], [N s]"""
+    left = (towards - thrust) * np.exp(-duration / lag) if lag > 0.0 else 0.0
+    return towards - left, towards * duration - lag * (towards - thrust - left)
+
+
+@jit
+def impulses(thrusters, cycle, on, was_on, level, chill, thrust, start, stop, out):
+    """Impulse (j,) of each thruster between two moments of a cycle, counted from its start; ``thrust`` moves on. [N s]
+
+    Until the order is felt the valve does what it was told a cycle ago, but one told to close holds its thrust, as 001
+    section V says.  A lone pulse of D then gives, with E = exp(-(D - delay) / rise),
+
+        J / F = D + fall - rise + (rise - delay - fall) E"""
+    for k in range(len(thrust)):
+        rise = thrusters.rise[0, k] + chill[k] * (thrusters.rise[1, k] - thrusters.rise[0, k])
+        fall = thrusters.fall[0, k] + chill[k] * (thrusters.fall[1, k] - thrusters.fall[0, k])
+        felt = min(max(thrusters.delay[k], start), stop)
+        before = 0.0
+        if was_on[k] and on[k]:
+            thrust[k], before = settle(thrust[k], level[k], rise, felt - start)
+        elif was_on[k]:
+            before = thrust[k] * (felt - start)
+        else:
+            thrust[k], before = settle(thrust[k], 0.0, fall, felt - start)
+        if on[k]:
+            thrust[k], after = settle(thrust[k], level[k], rise, stop - felt)
+        else:
+            thrust[k], after = settle(thrust[k], 0.0, fall, stop - felt)
+        out[k] = before + after + thrusters.leak[cycle, k] * (stop - start)
+
+
+@jit
+def _order_pulses(thrusters, e, rate_error, burn, push, on):
+    """Which thrusters fire for a cycle: outside the deadband those that push back, in a burn all that may.
+
+    ``push`` (3,) has the sense about each axis from one cycle to the next, for hysteresis.  A thruster that serves two
+    axes at odds stays off, or in a burn on."""
+    for i in range(3):
+        edge = thrusters.deadband[burn + 1, i]
+        near = edge + thrusters.lead * thrusters.approach_rate  # from farther off it comes no faster
+        beyond = min(max(e[i], -near), near) + thrusters.lead * rate_error[i]
+        if push[i] * beyond <= edge - thrusters.hysteresis:
+            push[i] = np.sign(beyond) if abs(beyond) > edge else 0.0
+    for k in range(len(on)):
+        use = thrusters.serves[k, 0] * push[0] + thrusters.serves[k, 1] * push[1] + thrusters.serves[k, 2] * push[2]
+        on[k] = use > 0 or (burn >= 0 and thrusters.burns[k] and use == 0)
+
+
+@jit
+def fly_cycles(plant, loop, errors, thrusters, coasting, q_c, w_c, alpha_c, first_time, x, record):
     """Control cycles from ``first_time`` on, one row of ``record`` each, before its torque acts.
 
     Row: state, then estimation error (3), attitude error (3), estimated rate (3), controller rate
     error (3), commanded torque on the body (3), motor torques (n), drag estimates (n), measured wheel
-    rates (n), torque from outside (3).  Where ``coasting``, (N, n) bool, a wheel's motor is off, and what it
+    rates (n), torque from outside in place of coasting wheels (3), and of each thruster whether it is on, thrust,
+    impulse so far, leaks included (j each).  Where ``coasting``, (N, n) bool, a wheel's motor is off, and what it
     would have given the body comes from outside, exactly and at once.  Returns the rows written and the wheel that reached its rate limit (-1: none)."""
     n, size = len(plant.spin_inertia), len(x)
     cycles = len(record)
@@ -326,6 +406,12 @@ def fly_cycles(plant, loop, errors, coasting, q_c, w_c, alpha_c, first_time, x, 
     expected = plant.spin_inertia * x[7 : 7 + n]  # wheel momentum the commands alone would give
     integral, ordered, outside = np.zeros(n), np.zeros(n), np.zeros(3)
     step = loop.period / loop.substeps
+    fired = len(thrusters.delay)
+    on, was_on, level, chill = np.zeros(fired, np.bool_), np.zeros(fired, np.bool_), np.zeros(fired), np.ones(fired)
+    thrust, given, impulse = np.zeros(fired), np.zeros(fired), np.zeros(fired)
+    push, rate_error, total = np.zeros(3), np.zeros(3), np.zeros(3)
+    burn, next_burn, burnt = -1, 0, 0.0
+    spin = x[7 : 7 + n].copy()  # wheel rates ordered
 
     for cycle in range(cycles):
         t = first_time + cycle * loop.period
@@ -360,6 +446,8 @@ def fly_cycles(plant, loop, errors, coasting, q_c, w_c, alpha_c, first_time, x, 
         if loop.gyroscopic_feedforward:
             _cross(w_c[cycle], believed, feed)
             torque += feed
+        if thrusters.in_control:
+            torque[:] = 0.0
 
         for k in range(n):
             wanted = 0.0
@@ -377,10 +465,31 @@ def fly_cycles(plant, loop, errors, coasting, q_c, w_c, alpha_c, first_time, x, 
             ordered[k] = waiting[now, k] if cycle >= loop.delay_cycles else 0.0
             if coasting[cycle, k]:
                 motor[k] = 0.0
+                spin[k] = measured[k]
                 for i in range(3):
                     outside[i] -= ordered[k] * plant.wheel_axes[k, i]
                 continue
+            if thrusters.in_control:
+                speed_up = WHEEL_RATE_GAIN * (spin[k] - measured[k])
+                if not np.isnan(thrusters.spin_order[cycle, k]):
+                    slope = (thrusters.spin_order[cycle, k] - spin[k]) / (thrusters.spin_cycles[cycle, k] * loop.period)
+                    spin[k] += slope * loop.period
+                    speed_up += slope
+                ordered[k] = plant.spin_inertia[k] * speed_up
             motor[k] = min(max(ordered[k] + drag_estimate[k], -loop.torque_limit[k]), loop.torque_limit[k])
+
+        if thrusters.in_control:
+            if burn < 0 and next_burn < len(thrusters.burn_start) and cycle >= thrusters.burn_start[next_burn]:
+                burn, next_burn, burnt = next_burn, next_burn + 1, 0.0
+            if burn >= 0 and burnt >= thrusters.burn_on_time[burn]:
+                burn = -1
+            rate_error[:] = w_c[cycle] - w_est
+            _order_pulses(thrusters, e, rate_error, burn, push, on)
+        for k in range(fired):
+            if on[k] and not was_on[k]:
+                level[k] = thrusters.steady[cycle, k]
+            if on[k] and thrusters.burns[k]:
+                burnt += loop.period
 
         row = record[cycle]
         row[:size] = x
@@ -392,11 +501,30 @@ def fly_cycles(plant, loop, errors, coasting, q_c, w_c, alpha_c, first_time, x, 
         row[size + 15 : size + 15 + n] = motor
         row[size + 15 + n : size + 15 + 2 * n] = drag_estimate
         row[size + 15 + 2 * n : size + 15 + 3 * n] = measured
-        row[size + 15 + 3 * n :] = outside
+        row[size + 15 + 3 * n : size + 18 + 3 * n] = outside
+        row[size + 18 + 3 * n : size + 18 + 3 * n + fired] = on
+        row[size + 18 + 3 * n + fired : size + 18 + 3 * n + 2 * fired] = thrust
+        row[size + 18 + 3 * n + 2 * fired :] = impulse
         for k in range(n):
             if abs(x[7 + k]) >= loop.rate_limit[k]:
                 return cycle + 1, k
-        advance(t, x, motor, outside, plant, step, loop.substeps, work)
+        if fired == 0:
+            advance(t, x, motor, outside, plant, step, loop.substeps, work)
+        else:
+            for s in range(loop.substeps):
+                impulses(thrusters, cycle, on, was_on, level, chill, thrust, s * step, (s + 1) * step, given)
+                total[:] = outside
+                for k in range(fired):
+                    impulse[k] += given[k]
+                    for i in range(3):
+                        total[i] += thrusters.arms[k, i] * given[k] / step
+                advance(t + s * step, x, motor, total, plant, step, 1, work)
+            for k in range(fired):
+                was_on[k] = on[k]
+                if on[k]:
+                    chill[k] *= np.exp(-loop.period / thrusters.heating)
+                else:
+                    chill[k] = 1 - (1 - chill[k]) * np.exp(-loop.period / thrusters.cooling)
         for k in range(n):
             # a saturated motor is the controller's doing, not drag; nor is one that is off
             expected[k] += (motor[k] - drag_estimate[k]) * loop.period

@@ -6,13 +6,27 @@ Times count from the epoch, at which recording starts.  docs/simulator.md lists 
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..craft.model import Direction, InertiaElements, Kilogram, Metre, NewtonMetre, Radian, RadianPerSecond, Second, _in
+from ..craft.model import (
+    Direction,
+    InertiaElements,
+    Kilogram,
+    Metre,
+    MetrePerSecond,
+    MetreVector,
+    Newton,
+    NewtonMetre,
+    Radian,
+    RadianPerSecond,
+    Second,
+    _in,
+)
 from ..kit.errors import BadInput
 from ..kit.quantities import numbers, quantity
 from ..kit.timeline import utc_to_tai_ns
@@ -43,7 +57,7 @@ def _by_name(unit: str):
     return Annotated[dict[str, float], BeforeValidator(parse)]
 
 
-TorqueVector, RateVector = _in("N m", 3), _in("rad/s", 3)
+TorqueVector, RateVector, AngleVector = _in("N m", 3), _in("rad/s", 3), _in("rad", 3)
 RadianPerSecond2, KilometrePerSecond, Kelvin = _in("rad/s2"), _in("m/s"), _in("K")
 
 
@@ -119,9 +133,9 @@ class Slew(Part):
 
 
 class Coast(Part):
-    """A wheel left to its bearing: the motor is off, and an ideal torque from outside does its part of the hold.
+    """A wheel left to its bearing: the motor is off.
 
-    001 holds the attitude with thrusters in a run-down; their pulses are not modelled here."""
+    Where the wheels hold the attitude an ideal torque from outside does this one's part of it."""
 
     wheel: str
     start: Second
@@ -145,6 +159,73 @@ class DragSpike(Part):
     start: Second
     duration: Second = Field(gt=0)
     torque: NewtonMetre = Field(gt=0)
+
+
+class CatalystBeds(Part):
+    """Rise and fall that follow the beds' warmth: cold at the start, warmer with every second of firing.
+
+    001 section V: 15 to 25 ms and 40 to 90 ms; the beds' own time constants are assumed."""
+
+    hot_rise: Second = Field(default=0.015, ge=0)
+    hot_fall: Second = Field(default=0.040, ge=0)
+    cold_rise: Second = Field(default=0.025, ge=0)
+    cold_fall: Second = Field(default=0.090, ge=0)
+    heating: Second = Field(default=2.0, gt=0)
+    cooling: Second = Field(default=900.0, gt=0)
+
+
+class ThrusterUse(Part):
+    """The craft's thrusters, holding the attitude unless ``control`` is false."""
+
+    control: bool = True
+    thrust: Newton | None = Field(default=None, gt=0)  # the craft's own on the date
+    center_of_mass: MetreVector | None = None  # where the craft's file has none
+    deadband: AngleVector = (2e-3, 2e-3, 2e-3)  # 001 section V
+    rise: Second | None = Field(default=None, ge=0)  # the craft's own
+    fall: Second | None = Field(default=None, ge=0)
+    pulse_scatter: float = Field(default=0.0, ge=0, lt=0.3)  # one sigma of a pulse's thrust, relative
+    catalyst_beds: CatalystBeds | None = None
+
+    @model_validator(mode="after")
+    def _one_lag(self):
+        if self.catalyst_beds is not None and (self.rise is not None or self.fall is not None):
+            raise ValueError("give either rise and fall, or catalyst_beds")
+        return self
+
+
+class ThrusterFault(Part):
+    """A thruster that leaks, whatever is ordered of it, or whose pulses are weak."""
+
+    thruster: str
+    start: Second
+    stop: Second = float("inf")
+    leak: Newton = Field(default=0.0, ge=0)
+    factor: float = Field(default=1.0, ge=0)  # on its thrust
+
+
+class WheelBias(Part):
+    """Wheels brought to new rates in straight lines while thrusters hold the attitude."""
+
+    start: Second
+    stop: Second
+    rates: _by_name("rad/s")  # type: ignore[valid-type]
+
+    @model_validator(mode="after")
+    def _forward(self):
+        if self.stop <= self.start:
+            raise ValueError("a wheel bias stops after it starts")
+        return self
+
+
+class Burn(Part):
+    """A change of velocity by the thrusters that burn, the others and their off-pulses holding the attitude.
+
+    It is over when on-time times ``thrust`` over mass, as the flight software reckons, reaches ``delta_v`` (001 section V)."""
+
+    start: Second
+    delta_v: MetrePerSecond = Field(gt=0)
+    thrust: Newton | None = Field(default=None, gt=0)  # as the flight software believes it; the true one
+    deadband: AngleVector = tuple(np.radians([0.5, 0.5, 1.0]))
 
 
 class CoverMotion(Part):
@@ -210,6 +291,9 @@ class Sampling(Part):
     quaternion: Second = 4.0
     control_torque: Second = 0.0
     wheel_momentum: Second = 0.0
+    on_time: Second = 16.0  # thrusters' counters, only where the flight has any
+    pulse_count: Second = 0.0
+    accelerometer_count: Second = 0.0
     wheel_drag_torque: Second = 4.0  # only where the controller estimates it
     mechanism: Second = 64.0  # cover angle, motor current, temperature and states
     quantum: dict[str, str] = Field(default_factory=dict)  # family -> one count, with its unit
@@ -263,11 +347,16 @@ class Scenario(Plan):
     craft_mass: Kilogram | None = Field(default=None, gt=0)  # of all of it, propellant too
     friction: bool = False
     gyro_bias: RateVector = (0.0, 0.0, 0.0)  # what calibration left over
+    accelerometer_bias: _in("m/s2") = 0.0  # type: ignore[valid-type]
     wheel_rates: _by_name("rad/s") = Field(default_factory=dict)  # type: ignore[valid-type]
     torques: tuple[AnyTorque, ...] = ()
     slews: tuple[Slew, ...] = ()
     coasts: tuple[Coast, ...] = ()
     drag_spikes: tuple[DragSpike, ...] = ()
+    thrusters: ThrusterUse | None = None
+    thruster_faults: tuple[ThrusterFault, ...] = ()
+    wheel_biases: tuple[WheelBias, ...] = ()
+    burns: tuple[Burn, ...] = ()
     cover: CoverMotion | None = None
     controller: Controller = Controller()
     telemetry: Sampling = Sampling()
@@ -279,6 +368,16 @@ class Scenario(Plan):
             utc_to_tai_ns(self.epoch)
         except BadInput as why:
             raise ValueError(f"epoch: {why.what}") from None
+        return self
+
+    @model_validator(mode="after")
+    def _with_thrusters(self):
+        if self.thrusters is None and (self.thruster_faults or self.telemetry.accelerometer_count):
+            raise ValueError("thruster_faults and accelerometer_count are of a flight with [thrusters]")
+        if (self.wheel_biases or self.burns) and not (self.thrusters and self.thrusters.control):
+            raise ValueError("wheel_biases and burns need [thrusters] that hold the attitude")
+        if any(b.start < a.start for a, b in pairwise(self.burns)):
+            raise ValueError("burns: in order of their start")
         return self
 
     def known_mass(self, who: str) -> float:

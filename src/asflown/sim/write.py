@@ -45,6 +45,10 @@ def truth_table(flight) -> str:
     add("estimation_error", "rad", truth.estimation_error_rad, AXES)
     if flight.scenario.coasts:
         add("holding_torque", "N m", truth.holding_torque_Nm, AXES)
+    if truth.thrusters is not None:
+        add("thrust", "N", truth.thrusters.thrust_N, truth.thrusters.names)
+        add("impulse", "N s", truth.thrusters.impulse_Ns, truth.thrusters.names)
+        add("linear_impulse_inertial", "N s", truth.thrusters.linear_impulse_Ns(truth.attitude), AXES)
     if truth.cover_angle_rad is not None:
         columns["cover_angle [rad]"] = truth.cover_angle_rad
     head = [
@@ -75,12 +79,32 @@ def truth_record(flight) -> dict:
         "coasts": [c.model_dump() for c in scenario.coasts],
         "drag_spikes": [d.model_dump() for d in scenario.drag_spikes],
         "wheel_drag": _drag_of(flight),
+        "thrusters": None if truth.thrusters is None else _thrusters_of(flight),
         "peaks": [{"time_s": t, "torque_Nm": T, "axis": a} for t, T, a in truth.peaks],
         "assumptions": list(scenario.assumptions),
         "doubts": list(flight.doubts),
         "as_written": scenario.as_written,
         "versions": {"python": platform.python_version()}
         | {p: version(p) for p in ("asflown", "numpy", "scipy", "numba")},
+    }
+
+
+def _thrusters_of(flight) -> dict:
+    """What each thruster is and did; pulses are start, on-time and the thrust they rise to."""
+    truth, fired = flight.truth, flight.truth.thrusters
+    return {
+        name: {
+            "arm_m": fired.arms_m[k].tolist(),
+            "direction": fired.directions[k].tolist(),
+            "delay_s": fired.delay_s[k],
+            "rise_hot_cold_s": fired.rise_s[:, k].tolist(),
+            "fall_hot_cold_s": fired.fall_s[:, k].tolist(),
+            "on_time_s": fired.on_time_s[-1, k],
+            "impulse_Ns": fired.impulse_Ns[-1, k],
+            "leak_Ns": float(np.sum(fired.leak_N[:-1, k]) * fired.period_s),
+            "pulses": fired.pulses_of(name, truth.time_s),
+        }
+        for k, name in enumerate(fired.names)
     }
 
 
