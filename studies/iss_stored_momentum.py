@@ -20,6 +20,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 import asflown
+from asflown.dynamics.environment import gravity_gradient
 from asflown.dynamics.momentum import stored_momentum
 from asflown.kit.regression import local_polynomial
 from asflown.kit.rotations import rotation
@@ -34,7 +35,6 @@ RECORDING = DATA / "iss" / "iss_20181012_hours_00_12.csv.gz"
 AXES = ("x", "y", "z")
 SHORTEST_S = 1800.0
 BRIDGES = (5, 30)  # missing samples in a row that do not end a stretch; 5 is the house rule
-MU_EARTH = 3.986004418e14  # [m3/s2]
 LONG_WINDOW_S = 600.0
 
 
@@ -70,13 +70,11 @@ def fitted_momentum(time_s, u, omega, size):
     return best.x, magnitude(best.x), float(np.sqrt(np.mean(best.fun**2)))
 
 
-def gravity_gradient(telemetry, I_B) -> tuple[np.ndarray, np.ndarray]:
+def pull_of_gravity(telemetry, I_B) -> tuple[np.ndarray, np.ndarray]:
     """Seconds (N,) and 3 mu / r^5 r x I r in body axes (N, 3) [N m], for a constant inertia."""
     names = [f"quaternion_{m}" for m in "wxyz"] + [f"orbit_position_{a}" for a in AXES]
     tai_ns, v = together(telemetry, names)
-    r_B = rotation(v[:, :4]).inv().apply(v[:, 4:])
-    r = np.linalg.norm(r_B, axis=1, keepdims=True)
-    return telemetry.seconds(tai_ns), 3 * MU_EARTH / r**5 * np.cross(r_B, r_B @ I_B)
+    return telemetry.seconds(tai_ns), gravity_gradient(I_B, rotation(v[:, :4]).inv().apply(v[:, 4:]))
 
 
 def slope_noise(half_width_s: float) -> float:
@@ -135,7 +133,7 @@ def main(folder: Path | None = None) -> None:
 
     craft = asflown.load_craft("iss")
     I_B = craft.at(telemetry.epoch_ns).inertia_kgm2
-    at, gravity = gravity_gradient(telemetry, I_B)
+    at, gravity = pull_of_gravity(telemetry, I_B)
     print("\nExternal torque [N m]: momentum method, and a gravity gradient of the craft's inertia")
     print(
         "  window   axis   mean    std   1 sigma stated   rate noise [rad/s]   I x noise x slope   gravity: mean    std   correlation"

@@ -23,6 +23,8 @@ _PUBLIC = {
     "ExternalTorque": "asflown.estimate.external_result",
     "wheel_drag": "asflown.estimate.wheel_drag",
     "WheelsResult": "asflown.estimate.wheel_result",
+    "inertia_tensor": "asflown.estimate.inertia",
+    "InertiaResult": "asflown.estimate.inertia_result",
     "Scenario": "asflown.sim.scenario",
     "load_scenario": "asflown.sim.scenario",
     "fly": "asflown.sim.fly",
@@ -55,6 +57,8 @@ if TYPE_CHECKING:
     from asflown.estimate.compare import compare_torques
     from asflown.estimate.external_result import ExternalTorque
     from asflown.estimate.external_torque import external_torque
+    from asflown.estimate.inertia import inertia_tensor
+    from asflown.estimate.inertia_result import InertiaResult
     from asflown.estimate.result import TorqueResult
     from asflown.estimate.torque import disturbance_torque
     from asflown.estimate.wheel_drag import wheel_drag

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from asflown.estimate.excitation import COMPONENTS, components, excitation, normal_matrix, tensor_of
+from asflown.dynamics.rigid_body import ELEMENTS, elements_of, tensor_of
+from asflown.estimate.excitation import excitation, normal_matrix
 from asflown.kit.errors import BadInput
 from asflown.sim.fly import fly
 from asflown.telemetry.attitude import together
@@ -48,7 +49,7 @@ def test_published_ranks_by_direction(directions, rank, untold, jitter):
     e = excitation(turns(*directions, jitter=jitter), jitter)
     assert e.rank == rank
     if untold is not None:
-        assert set(e.untold) == untold and set(e.told) == set(COMPONENTS) - untold
+        assert set(e.untold) == untold and set(e.told) == set(ELEMENTS) - untold
 
 
 def test_skew_directions_are_told_in_words():
@@ -87,13 +88,13 @@ def test_law_what_is_not_told_leaves_the_momentum_alone():
     other = np.diag([7000.0, 6000.0, 3000.0])
     assert excitation(w).untold == ("Izz",)
     assert w @ (other + np.diag([0, 0, 500.0])) == pytest.approx(w @ other, abs=1e-12)
-    assert tensor_of(components(other)) == pytest.approx(other)
+    assert tensor_of(elements_of(other)) == pytest.approx(other)
 
 
 def test_noise_alone_and_a_quiet_hold_tell_nothing():
     w = NOISE * np.random.default_rng(3).standard_normal((120, 3))
     assert excitation(w).rank == 6  # without its noise known, noise is turning
-    assert excitation(w, NOISE).rank == 0 and excitation(w, NOISE).untold == COMPONENTS
+    assert excitation(w, NOISE).rank == 0 and excitation(w, NOISE).untold == ELEMENTS
     assert excitation(turns(X, jitter=NOISE), NOISE).rank == 3
 
 

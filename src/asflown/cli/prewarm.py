@@ -4,13 +4,15 @@ from __future__ import annotations
 
 
 def prewarm() -> None:
-    """A short flight and its torque by the fused method: all array types the kernels will ever see."""
+    """Short flights, a torque by the fused method, a tensor from a slew: all array types the kernels will ever see."""
     from asflown.craft.load import load_craft
+    from asflown.estimate.inertia import inertia_tensor
     from asflown.estimate.torque import disturbance_torque
     from asflown.sim.fly import fly
 
     flight = fly("quiet", duration="120 s", settle="0 s")
     disturbance_torque(flight.telemetry, load_craft("cassini"), method="fused", axis="y")
+    inertia_tensor(fly("slews", duration="500 s").telemetry, load_craft("cassini"))
 
 
 if __name__ == "__main__":

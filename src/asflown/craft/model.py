@@ -118,6 +118,14 @@ class MassProperties(_Data):
         return self.inertia if self.inertia is not None else self.inertia_per_spin_inertia
 
 
+class InertiaRequirement(_Data):
+    """How well the tensor must be known: moments as a share of themselves, products in kg m2."""
+
+    moments: Annotated[float, BeforeValidator(lambda v: quantity(v, ""))] = Field(gt=0)
+    products: KilogramMetre2 = Field(gt=0)
+    source: str = ""
+
+
 class PropellantUsed(_Data):
     date: Date
     used: Kilogram
@@ -295,6 +303,7 @@ class Craft(_Data):
     name: str
     description: str = ""
     mass_properties: tuple[MassProperties, ...] = ()
+    inertia_requirement: InertiaRequirement | None = None
     propellant: tuple[PropellantUsed, ...] = ()
     wheels: tuple[Wheel, ...] = ()
     wheel_controller: WheelController | None = None

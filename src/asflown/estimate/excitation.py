@@ -15,13 +15,11 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
+from ..dynamics.rigid_body import ELEMENTS, elements_of
 from ..kit.errors import BadInput
 
-#: Order of the components in every vector of six here (001 eq 10).
-COMPONENTS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 #: Where each element of the tensor stands among the six.
 _PLACE = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
-_ROW, _COLUMN = np.triu_indices(3)
 
 #: A direction counts when the rate about it is more than this share of the largest, rms.  In single turns of the
 #: simulated flights the rate about the other axes is 0.1 to 0.2 % of the turn's with nominal noise, 0.2 to 0.3 % with
@@ -50,6 +48,12 @@ class Excitation:
     untold: tuple[str, ...]
     directions: np.ndarray
     rate_rms: np.ndarray
+
+    @property
+    def seen(self) -> np.ndarray:
+        """Projector (3, 3) onto the directions that count."""
+        counted = self.directions[: _RANK.index(self.rank)]
+        return counted.T @ counted
 
     def sentences(self) -> list[str]:
         """What can and what cannot be told, in words."""
@@ -106,30 +110,20 @@ def normal_matrix(square, weights=(1.0, 1.0, 1.0)) -> np.ndarray:
     return out
 
 
-def components(I_B) -> np.ndarray:
-    """The six of a symmetric tensor (3, 3), in the order of COMPONENTS."""
-    return np.asarray(I_B, float)[_ROW, _COLUMN]
-
-
-def tensor_of(six) -> np.ndarray:
-    """The symmetric tensor (3, 3) of six components."""
-    return np.asarray(six, float)[_PLACE]
-
-
 def _told(directions, counted: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Names of what is told and of what is not, from the directions (rows) of which the first few count."""
     blind = directions[counted:]
     if not len(blind):
-        return COMPONENTS, ()
+        return ELEMENTS, ()
     # tensors that give no momentum at any rate seen: u v^T + v u^T for u, v across all of these
-    hidden = [components(np.outer(u, v) + np.outer(v, u)) for u, v in combinations_with_replacement(blind, 2)]
+    hidden = [elements_of(np.outer(u, v) + np.outer(v, u)) for u, v in combinations_with_replacement(blind, 2)]
     basis, _ = np.linalg.qr(np.array(hidden).T)
     share = np.linalg.norm(basis, axis=1)
-    told = tuple(n for n, s in zip(COMPONENTS, share, strict=True) if s < _FREE)
-    untold = tuple(n for n, s in zip(COMPONENTS, share, strict=True) if s > np.sqrt(1 - _FREE**2))
+    told = tuple(n for n, s in zip(ELEMENTS, share, strict=True) if s < _FREE)
+    untold = tuple(n for n, s in zip(ELEMENTS, share, strict=True) if s > np.sqrt(1 - _FREE**2))
     if len(untold) == len(hidden):
         return told, untold
-    mixed = ", ".join(n for n, s in zip(COMPONENTS, share, strict=True) if s >= _FREE)
+    mixed = ", ".join(n for n, s in zip(ELEMENTS, share, strict=True) if s >= _FREE)
     if counted == 2:
         return told, (f"the moment about {named(blind[0])}, which mixes {mixed}",)
     axis = named(directions[0])

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..craft.model import Craft, MassProperties, tensor
+from ..craft.model import Craft, InertiaRequirement, MassProperties, tensor
 from ..kit.errors import BadInput
 from ..kit.timeline import utc_label
 from ..telemetry.attitude import MISTAKEN_UNITS
-from .slew_plan import MOMENT_SHARE, PRODUCT_KGM2
 
 #: Rows of Table 1, and where they stand in the tensor.
 ROWS = {"Ixx": (0, 0), "Iyy": (1, 1), "Izz": (2, 2), "Ixy": (0, 1), "Ixz": (0, 2), "Iyz": (1, 2)}
@@ -30,6 +29,7 @@ class Prediction:
     basis: str
     date: str
     source: str
+    requirement: InertiaRequirement | None = None
     doubts: tuple[str, ...] = ()
 
 
@@ -102,16 +102,22 @@ class InertiaComparison:
             f"  {'':4}{'predicted':>11}{'estimated':>11}{'sigma':>9}{'error':>11}   requirement",
         ]
         for r in self.rows:
-            unit, digits = (" %", 2) if r.moment else ("  ", 1)
+            unit = " %" if r.moment else "  "
+            error = f"{r.error:+.2f}" if r.moment else _short(r.error, "+")
             sigma = "" if r.sigma is None else f"{r.sigma:.3g}"
             asked = "" if r.requirement is None else f"{r.requirement:g}{unit.rstrip()} {r.verdict}"
             lines.append(
-                f"  {r.name:4}{r.predicted:>11.1f}{r.estimated:>11.1f}{sigma:>9}{r.error:>+9.{digits}f}{unit}   {asked}".rstrip()
+                f"  {r.name:4}{_short(r.predicted):>11}{_short(r.estimated):>11}{sigma:>9}{error:>9}{unit}   {asked}".rstrip()
             )
         lines.append(
-            f"  smallest principal moment {self.smallest_moment:.1f}, triangle margin {self.triangle_margin:.1f}"
+            f"  smallest principal moment {_short(self.smallest_moment)}, triangle margin {_short(self.triangle_margin)}"
         )
         return "\n".join(lines)
+
+
+def _short(value: float, sign: str = "") -> str:
+    """In columns: tenths, or four digits where there would be too many."""
+    return f"{value:{sign}.1f}" if abs(value) < 1e6 else f"{value:{sign}.4g}"
 
 
 def predicted_inertia(craft: Craft, tai_ns: int | None) -> Prediction:
@@ -125,7 +131,14 @@ def predicted_inertia(craft: Craft, tai_ns: int | None) -> Prediction:
     candidates = [m for m in craft.mass_properties if m.basis == "predicted" and piece in (None, m.piece)]
     if candidates:
         m = min(candidates, key=lambda m: abs(m.date - moment))
-        return Prediction(tensor(m.elements), "predicted", utc_label(m.date)[:10], m.source, _age(m, moment))
+        return Prediction(
+            tensor(m.elements),
+            "predicted",
+            utc_label(m.date)[:10],
+            m.source,
+            craft.inertia_requirement,
+            _age(m, moment),
+        )
     now = craft.at(tai_ns)
     if now.inertia_kgm2 is None:
         raise BadInput(
@@ -137,7 +150,7 @@ def predicted_inertia(craft: Craft, tai_ns: int | None) -> Prediction:
     )
     date = utc_label(moment)[:10] if piece != "given" else "any date"
     doubts = () if piece == "given" else ("no prediction is in the craft file for this configuration",)
-    return Prediction(now.inertia_kgm2, "craft's", date, source, (*doubts, *now.doubts))
+    return Prediction(now.inertia_kgm2, "craft's", date, source, craft.inertia_requirement, (*doubts, *now.doubts))
 
 
 def _age(m: MassProperties, moment: int) -> tuple[str, ...]:
@@ -149,13 +162,15 @@ def _age(m: MassProperties, moment: int) -> tuple[str, ...]:
 def compare_inertia(estimate, prediction: Prediction, sigma=None, relative: bool = False) -> InertiaComparison:
     """Set an estimate (3, 3) against a prediction; ``sigma`` (3, 3): its total one sigma, where known.
 
-    ``relative``: both are per unit spin inertia, for which 001 has no requirement on products."""
+    ``relative``: both are per unit spin inertia, of which no requirement on products speaks."""
     I_B, rows = np.asarray(estimate, float), []
     for name, at in ROWS.items():
         predicted, estimated = float(prediction.inertia[at]), float(I_B[at])
         s = None if sigma is None else float(np.asarray(sigma, float)[at])
         scale = 100 / predicted if at[0] == at[1] else 1.0
-        asked = 100 * MOMENT_SHARE if at[0] == at[1] else None if relative else PRODUCT_KGM2
+        asked = None
+        if prediction.requirement is not None and not (relative and at[0] != at[1]):
+            asked = 100 * prediction.requirement.moments if at[0] == at[1] else prediction.requirement.products
         error = scale * (predicted - estimated)
         s_error = None if s is None else abs(scale) * s
         rows.append(Compared(name, predicted, estimated, s, error, s_error, asked, _verdict(error, s_error, asked)))
@@ -197,3 +212,20 @@ def _wrong_unit(estimate, predicted) -> list[str]:
     if not guesses:
         return []
     return [f"all moments are {mean:.3g} times the predicted ones: are the {', or the '.join(guesses)}?"]
+
+
+def compared_history(craft: Craft) -> list[tuple[str, str, InertiaComparison]]:
+    """(date, configuration, comparison) of every estimate in the craft file that has a prediction of its own date: 001's
+    Table 1 for Cassini."""
+    found = []
+    for m in sorted(craft.mass_properties, key=lambda m: m.date):
+        prediction = next(
+            (p for p in craft.mass_properties if p.basis == "predicted" and (p.date, p.piece) == (m.date, m.piece)),
+            None,
+        )
+        if m.basis != "estimated" or prediction is None:
+            continue
+        date = utc_label(m.date)[:10]
+        p = Prediction(tensor(prediction.elements), "predicted", date, prediction.source, craft.inertia_requirement)
+        found.append((date, m.piece, compare_inertia(tensor(m.elements), p, relative=m.inertia is None)))
+    return found

@@ -17,19 +17,19 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..craft.model import Craft, CraftAt
+from ..dynamics.rigid_body import ELEMENTS, elements_of
 from ..kit.errors import BadInput
 from ..kit.regression import noise_sigma
 from ..kit.timeline import NS, cadence_ns, seconds_since
 from ..telemetry.attitude import together
 from ..telemetry.channels import AXES
 from ..telemetry.telemetry import Channel, Telemetry
-from .excitation import COMPONENTS, components, excitation, named, normal_matrix
+from .excitation import excitation, named, normal_matrix
 from .subject import subject_of
 
-#: 001 section IV's requirement on the inertia: moments as a share, products in kg m2.
-MOMENT_SHARE, PRODUCT_KGM2 = 0.10, 75.0
-#: Products where only ratios to the spin inertia are known: 75 of some 7000 kg m2.
-_PRODUCT_SHARE = 0.01
+#: What is known of any craft beforehand, one sigma: 001's requirement, moments to 10 % and products to 75 kg m2, which
+#: is 1.3 % of Cassini's mean moment.
+_MOMENT_SHARE, _PRODUCT_SHARE = 0.10, 0.013
 #: Nominal noise of a sample of body and wheel rate. [rad/s]
 RATE_SIGMA, WHEEL_SIGMA = 2e-6, 0.005
 
@@ -41,7 +41,7 @@ _NOISE_WINDOW = 5.0  # half-width of the fits whose residuals are the rates' noi
 
 @dataclass(frozen=True)
 class SlewOption:
-    """One turn, and what it would leave: ``sigma`` (6,), one sigma in the order of COMPONENTS.
+    """One turn, and what it would leave: ``sigma`` (6,), one sigma in the order of ELEMENTS.
 
     ``gain``: half the fall of the covariance's log determinant, nats.  ``rate`` and ``acceleration`` are those wanted,
     or less: where the wheels cannot give them (``limited``), or the angle is too small to reach the rate."""
@@ -66,7 +66,7 @@ class SlewOption:
             "limited_by_wheels": self.limited,
             "gain_nats": self.gain,
             "rank": self.rank,
-            "sigma": dict(zip(COMPONENTS, self.sigma, strict=True)),
+            "sigma": dict(zip(ELEMENTS, self.sigma, strict=True)),
         }
 
 
@@ -95,7 +95,7 @@ class SlewPlan:
             "criterion": "D-optimal",
             "unit": "per spin inertia" if self.relative else "kg m2",
             "rank_before": self.rank_before,
-            "sigma_before": dict(zip(COMPONENTS, self.sigma_before, strict=True)),
+            "sigma_before": dict(zip(ELEMENTS, self.sigma_before, strict=True)),
             "best": self.best.record(),
             "others": [o.record() for o in self.options[1:]],
             "momentum_sigma_Nms": None if self.relative else self.momentum_sigma,
@@ -111,7 +111,7 @@ class SlewPlan:
             f"Next slew for the inertia tensor · {self.craft} · rank so far {self.rank_before}",
             f"  best: {np.degrees(b.angle):.3g} deg about {named(b.axis)} at {1e3 * b.rate:.3g} mrad/s, {b.duration_s:.0f} s: "
             f"rank {b.rank}",
-            f"  one sigma [{unit}]" + " " * (19 - len(unit)) + "gain" + "".join(f"{c:>9}" for c in COMPONENTS),
+            f"  one sigma [{unit}]" + " " * (19 - len(unit)) + "gain" + "".join(f"{c:>9}" for c in ELEMENTS),
             _row("now", None, self.sigma_before),
         ]
         for o in self.options:
@@ -151,7 +151,7 @@ def plan_slew(
         if not 0 < value < 1e6:
             raise BadInput(f"a turn of {what} {value:g} is none", remedy=f"Give a positive {what}.")
     noise = momentum_noise(I_B, now.wheels, rate_sigma, wheel_sigma)
-    prior = np.diag(1 / _prior_sigma(I_B, now.relative) ** 2)
+    prior = np.diag(1 / prior_sigma(I_B) ** 2)
     flown = np.zeros((1, 3)) if flown_B is None else np.asarray(flown_B, float).reshape(-1, 3)
     flown = flown[np.isfinite(flown).all(axis=1)]
     known = prior + _information((flown - flown.mean(axis=0)).T @ (flown - flown.mean(axis=0)), noise)
@@ -226,10 +226,11 @@ def momentum_noise(I_B, wheels, rate_sigma: float, wheel_sigma: float) -> np.nda
     return np.sqrt(rate_sigma**2 * np.sum(I_B**2, axis=1) + wheel_sigma**2 * (spin**2 @ axes**2))
 
 
-def _prior_sigma(I_B, relative: bool) -> np.ndarray:
-    size = components(I_B)
-    product = _PRODUCT_SHARE * np.trace(I_B) / 3 if relative else PRODUCT_KGM2
-    return np.where([c[1] == c[2] for c in COMPONENTS], MOMENT_SHARE * size, product)
+def prior_sigma(I_B) -> np.ndarray:
+    """One sigma of the six elements (6,) before anything is flown, about a tensor (3, 3)."""
+    size = elements_of(I_B)
+    product = _PRODUCT_SHARE * np.trace(I_B) / 3
+    return np.where([c[1] == c[2] for c in ELEMENTS], _MOMENT_SHARE * size, product)
 
 
 def _information(square, noise) -> np.ndarray:

@@ -151,18 +151,38 @@ def _error_scale(telemetry: Telemetry) -> Telemetry:
     )
 
 
-def _scales(telemetry: Telemetry, rate: np.ndarray, w: np.ndarray) -> Telemetry:
-    """Doubt a unit where rates and attitude move together but not by the same amount."""
+def rate_scale(telemetry: Telemetry) -> tuple[float, str] | None:
+    """Body rates over those of the quaternion, and what that factor betrays ('' where it is near one).
+
+    None where both are not there, or do not move together."""
+    names = [f"quaternion_{m}" for m in "wxyz"]
+    if not all(n in telemetry for n in names) or not telemetry.has_axes("body_rate"):
+        return None
+    tai_ns, q = together(telemetry, names)
+    near, w = _measured(telemetry, tai_ns)
+    if near is None:
+        return None
+    return _scale(_residual(tai_ns, q, near, w)[1], w)
+
+
+def _scale(rate: np.ndarray, w: np.ndarray) -> tuple[float, str] | None:
     common = float(np.sum(w * rate))
     if common <= 0 or common**2 < COHERENT * float(np.sum(w**2)) * float(np.sum(rate**2)):
-        return telemetry
+        return None
     scale = common / float(np.sum(rate**2))
     if 1 / OFF_SCALE < scale < OFF_SCALE:
-        return telemetry
+        return scale, ""
     near = [u for f, u in MISTAKEN_UNITS.items() if abs(np.log(scale / f)) < np.log(OFF_SCALE)]
-    guess = f": are they {near[0]}?" if near else ": check the unit of the body rates"
+    return scale, f"are they {near[0]}?" if near else "check the unit of the body rates"
+
+
+def _scales(telemetry: Telemetry, rate: np.ndarray, w: np.ndarray) -> Telemetry:
+    """Doubt a unit where rates and attitude move together but not by the same amount."""
+    found = _scale(rate, w)
+    if found is None or not found[1]:
+        return telemetry
     names = ", ".join(f"body_rate_{a}" for a in AXES)
-    return _doubted(telemetry, f"{names}: {scale:.4g} times the rates of the quaternion{guess}")
+    return _doubted(telemetry, f"{names}: {found[0]:.4g} times the rates of the quaternion: {found[1]}")
 
 
 def _rms(x: np.ndarray) -> float:

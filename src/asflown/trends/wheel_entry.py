@@ -17,26 +17,27 @@ _BASIS = "telemetry"
 def wheel_entry(
     result: WheelsResult, telemetry: Telemetry, craft: Craft, event_id: str | None, provenance: dict
 ) -> Entry:
+    """The entry of one record's wheels.  Raises BadInput for telemetry without an epoch."""
+    values = tuple(v for w in result.wheels for v in _values(w))
+    return record_entry(KIND, values, result.doubts, telemetry, craft, event_id, provenance)
+
+
+def record_entry(
+    kind: str, values: tuple[Value, ...], doubts: tuple[str, ...], telemetry: Telemetry, craft: Craft,
+    event_id: str | None, provenance: dict,
+) -> Entry:  # fmt: skip
     """The entry of one record; its date is that of the first sample, and its name too unless ``event_id`` gives one.
 
     Raises BadInput for telemetry without an epoch: what has no date has no place in a trend."""
     if not telemetry.dated:
         raise BadInput(
-            "the telemetry has no epoch, so its wheels have no place in a trend",
+            f"the telemetry has no epoch, so its {kind} has no place in a trend",
             file=telemetry.source or None,
             remedy="Put '# epoch: 2015-09-29T00:00:00 UTC' at the head of the file.",
         )
-    values = tuple(v for w in result.wheels for v in _values(w))
     date = utc_label(telemetry.span()[0])
-    return Entry(
-        craft.name,
-        event_id or f"{KIND}-{date[:10]}",
-        KIND,
-        date,
-        values=values,
-        doubts=result.doubts,
-        provenance=provenance,
-    )
+    name = event_id or f"{kind}-{date[:10]}"
+    return Entry(craft.name, name, kind, date, values=values, doubts=doubts, provenance=provenance)
 
 
 def _values(w: WheelDrag):

@@ -1,0 +1,379 @@
+"""Most likely tensor, momentum, outside torque and motion, given wheels, rates and attitude together.
+
+Gauss-Newton: linearize about the motion found so far, filter and regress, smooth, move the motion; the noise levels
+are the likeliest ones.  Steps of the acceleration are Student-t: every interval's own variance is reweighted, so that
+the corner of a ramp does not stiffen or loosen the rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import optimize
+
+from ..dynamics.rigid_body import momentum_regressor
+from ..kit.errors import BadInput
+from ..kit.regressed import Disturbances, Filtered, Steps, run, smooth
+from ..kit.rotations import rotation
+from .slew_model import (
+    Layout,
+    Levels,
+    Linearized,
+    Motion,
+    first_motion,
+    instants,
+    linearized,
+)
+from .slew_record import SlewRecord, third_difference_sigma
+
+#: Degrees of freedom of the acceleration's steps: between Cauchy's one and a few.
+_FREEDOM = 2.0
+#: Steps' variances settle slowly, each a little nearer: they go this much further than they would.
+_STRIDE = 1.6
+#: A corner is no looser than this: beyond it only rounding would show.
+_LOOSEST = 1e10
+#: What is assumed of time stamps and of the rates' bias: hardly anything. [s], [rad/s]
+_SKEW_S, _BIAS = 10.0, 1e-3
+#: A reading this many sigmas from what all others say of it is left out, and let in again below the second.
+_OUT, _IN = 6.0, 4.0
+#: In wheels' cadences, where single kicks tell all: a fit may slip from one reading of a kick to the next.
+_SKEW_KICKED = 0.25
+_SKEWS_TRIED = np.arange(-8.0, 8.01, 0.5)
+_MOST_ROUNDS = 20
+#: Sigmas the answer may still move by in the last round.
+_SETTLED = 0.05
+#: From this round on the constants are so nearly right that levels are fitted with them held, three times faster.
+_NEARLY = 3
+_TURNS = 8  # of the first round, in which the corners are found
+#: Factors by which one search may move a level; ten for the others.
+_REACH = {"jerk": 100.0, "kick": 100.0, "wander": 100.0, "coloured_s": 3.0}
+_LONGEST_S = 300.0
+#: Steps that the noise levels are fitted on, where there are more.
+_ENOUGH = 2000
+
+
+@dataclass(frozen=True)
+class SlewFit:
+    """The answer: beta (p,) with its random covariance, and its slope in the two scale errors (p, 2)."""
+
+    record: SlewRecord
+    layout: Layout
+    frame: str
+    beta: np.ndarray
+    covariance: np.ndarray
+    information: np.ndarray  # of beta, from the data alone (p, p)
+    by_scale: np.ndarray  # beta per unit error of the wheels' spin inertia, and of the rates' scale
+    levels: Levels
+    motion: Motion
+    model: Linearized
+    smoothed: Disturbances
+    filtered: Filtered
+    kept: np.ndarray  # (M,) bool
+    loosened: np.ndarray
+    rounds: int
+    converged: bool
+    log_likelihood: float
+
+    @property
+    def residual(self) -> np.ndarray:
+        """What every reading differs from the smoothed motion by, in its own unit. (M,)"""
+        z = self.model
+        departure = self.smoothed.mean
+        step = np.repeat(np.arange(len(z.start) - 1), np.diff(z.start))
+        return z.y - np.sum(z.H * departure[step], axis=1)
+
+    @property
+    def whitened(self) -> np.ndarray:
+        """Innovations over their sigma, outliers left out."""
+        return (self.filtered.innovation[:, 0] / np.sqrt(self.filtered.variance))[self.kept]
+
+
+def fit_slews(record: SlewRecord, *, frame: str = "body", prior: tuple[np.ndarray, np.ndarray] | None = None,
+              seen: np.ndarray | None = None, wander: bool = False, levels: Levels | None = None,
+              progress=None) -> SlewFit:  # fmt: skip
+    """``prior``: mean (6,) and information (6, 6) of the tensor's elements, None for none; ``seen`` (3, 3): projector
+    onto the directions of the slews, where they are not all; ``wander``: whether the total momentum walks, under
+    outside torques that vary.  ``levels``: known noise levels; fitted unless given.
+
+    Raises BadInput where the record tells nothing of the tensor."""
+    layout = Layout.of(record)
+    tell = progress or (lambda text: None)
+    beta, motion = _start(record, layout, wander)
+    skew = _SKEW_KICKED * _cadence(record) if wander else _SKEW_S
+    weight, centre = _priors(layout, prior, skew)
+    if prior is not None:
+        beta[layout.TENSOR] = prior[0]  # plain least squares has nothing to say where the slews do not
+    first = first_levels(record)
+    first = replace(first, **{n: max(getattr(first, n), 2 * v) for n, v in _floors(record).items()})
+    if wander:
+        first = replace(first, kick=first.rate, wander=first.wheel * float(np.median(record.momentum.unit)))
+    fitted = levels or first
+    loosened, last, converged = np.ones((len(motion.time_s), 6 if wander else 3)), motion, False
+    readings = np.ones(len(record.momentum.time_s) + len(record.rates.time_s) + 3 * len(record.attitude.time_s), bool)
+    for rounds in range(1, _MOST_ROUNDS + 1):
+        tell(f"round {rounds}")
+        motion = motion.at(instants(record, layout, beta))
+        model = linearized(record, layout, beta, motion, frame, first, np.eye(3) if seen is None else seen)
+        loosened = carried(loosened, last, motion)
+        last, before, kept = motion, fitted, readings[model.place]
+        around = (weight, centre - beta) if rounds < _NEARLY else None
+        for turn in range(_TURNS if rounds == 1 else 2):
+            # corners first: a level fitted before they are loose takes them for noise
+            loosened, kept = _reweighted(model, fitted, loosened, kept, around, outliers=rounds > 2 and not wander)
+            if levels is None and (rounds > 1 or turn >= _TURNS - 2):
+                fitted = _likeliest(model, fitted, loosened, kept, around)
+        readings[model.place] = kept
+        steps = model.at(fitted, loosened, kept)
+        f = run(steps)
+        delta, covariance, by_scale = solved(f, layout, weight, centre - beta)
+        s = smooth(steps, f, np.append(delta, [0.0, 0.0]))
+        log_likelihood = f.log_likelihood(np.append(delta, [0.0, 0.0]))
+        moved = np.max(np.abs(delta) / np.sqrt(np.diag(covariance)))
+        settled = moved < 0.5 * _SETTLED and (levels is not None or _near(before, fitted))
+        if settled or rounds == _MOST_ROUNDS:
+            converged = bool(moved < _SETTLED)
+            break
+        motion, beta = motion.moved(s.mean), beta + delta
+    information = f.information[1 : layout.size + 1, 1 : layout.size + 1]
+    return SlewFit(
+        record, layout, frame, beta + delta, covariance, information, by_scale, fitted, motion, model, s, f, kept, loosened,
+        rounds, converged, log_likelihood,
+    )  # fmt: skip
+
+
+def _priors(layout: Layout, prior, skew_s: float):
+    weight, centre = np.zeros((layout.size, layout.size)), np.zeros(layout.size)
+    for k in (layout.skew_wheels, layout.skew_rates):
+        if k is not None:
+            weight[k, k] = 1 / skew_s**2
+    if layout.bias is not None:
+        weight[layout.bias, layout.bias] = np.eye(3) / _BIAS**2
+    if prior is not None:
+        centre[layout.TENSOR], weight[layout.TENSOR, layout.TENSOR] = prior
+    return weight, centre
+
+
+def _cadence(record: SlewRecord) -> float:
+    return float(np.median(np.diff(np.unique(record.momentum.time_s))))
+
+
+def solved(f: Filtered, layout: Layout, weight: np.ndarray, away: np.ndarray):
+    """Least squares of the innovations with the prior: beta, covariance, slope in the scales."""
+    p, everything = layout.size, f.information
+    lam = everything[1 : p + 1, 1 : p + 1] + weight
+    if not np.isfinite(everything).all():
+        raise BadInput(
+            "the fit of the slews broke down: the telemetry's numbers are not those of one motion",
+            remedy="Check units and time stamps (asflown telemetry check), or narrow the window (--start, --stop).",
+        )
+    size = np.sqrt(np.maximum(np.diag(lam), 1e-300))
+    inverse = np.linalg.pinv(lam / np.outer(size, size), rcond=1e-14, hermitian=True) / np.outer(size, size)
+    delta = inverse @ (everything[1 : p + 1, 0] + weight @ away)
+    return delta, inverse, inverse @ everything[1 : p + 1, p + 1 :]
+
+
+def _likeliest(model: Linearized, levels: Levels, loosened, kept, around) -> Levels:
+    """Levels of the largest likelihood, the constants at their best for each, or held where ``around`` is None."""
+    part = _excerpt(model, loosened, kept)
+    floor = _floors(model.record)
+    floor |= {n: 1e-14 for n in ("kick", "wander") if getattr(levels, n) > 0}
+    names = list(floor)
+    first = np.array([max(getattr(levels, n), 1.001 * floor[n]) for n in names])
+
+    def cost(logs):
+        trial = replace(levels, **dict(zip(names, np.exp(logs), strict=True)))
+        value, slope = _cost(*part, trial, around)
+        if "coloured_s" in names:
+            h = 0.02
+            other = replace(trial, coloured_s=trial.coloured_s * np.exp(h))
+            slope["coloured_s"] = (_cost(*part, other, around, slopes=False)[0] - value) / h
+        return value, np.array([slope[n] for n in names])
+
+    reach = np.log([_REACH.get(n, 10.0) for n in names])  # of one call; a far step of the search would end in rounding
+    low, high = np.maximum(np.log(first) - reach, np.log([floor[n] for n in names])), np.log(first) + reach
+    if "coloured_s" in names:
+        high[names.index("coloured_s")] = np.log(_LONGEST_S)
+    best = optimize.minimize(cost, np.log(first), jac=True, method="L-BFGS-B", bounds=list(zip(low, high, strict=True)),
+                             options={"maxiter": 6, "ftol": 1e-7})  # fmt: skip
+    return replace(levels, **dict(zip(names, np.exp(best.x).tolist(), strict=True)))
+
+
+def _floors(record: SlewRecord) -> dict[str, float]:
+    """Levels that can be fitted, each with the least it may be: what rounding to counts makes, or a ten-millionth of
+    the readings themselves, which is what is left of digits in a table without noise."""
+
+    def least(stem, values):
+        return max(record.counts[stem] / np.sqrt(12), 1e-7 * float(np.sqrt(np.mean(values**2))), 1e-14)
+
+    floor = {"wheel": least("wheel_rate", record.momentum.value_Nms / record.momentum.unit), "jerk": 1e-14}
+    if record.has_rates:
+        floor["rate"] = least("body_rate", record.rates.value_rad_s)
+    if record.has_attitude:
+        floor |= {"attitude": 1e-9, "coloured": 1e-9, "coloured_s": 1.0}
+    return floor
+
+
+def _pass(steps: Steps, layout: Layout, around) -> tuple[Filtered, np.ndarray, float]:
+    """The filter with the constants at their best about ``around`` (prior information, distance to its centre), or held
+    (None); the constants' move, for all columns that were run; and what the prior takes off the log likelihood."""
+    if around is None:
+        return run(replace(steps, Z=steps.Z[:, :0])), np.empty(0), 0.0
+    f = run(steps)
+    beta, _, _ = solved(f, layout, *around)
+    off = beta - around[1]
+    return f, np.append(beta, [0.0, 0.0]), float(0.5 * off @ around[0] @ off)
+
+
+def _cost(model: Linearized, loosened, kept, levels: Levels, around, slopes: bool = True):
+    """Minus log likelihood, and its slope in the log of every level."""
+    steps = model.at(levels, loosened, kept)
+    f, whole, penalty = _pass(steps, model.layout, around)
+    value = penalty - f.log_likelihood(whole)
+    if not slopes:
+        return value, {}
+    s = smooth(steps, f, whole)
+    noise = np.where(kept, s.by_noise, 0.0)
+    slope = {name: -2 * noise[model.kind == k].sum() for k, name in enumerate(("wheel", "rate", "attitude"))}
+    slope["jerk"] = -2 * s.by_drive[:, :3].sum()
+    if model.walks == 2:
+        slope["kick"] = -2 * s.by_drive[:, 3:6].sum()
+    if model.coloured is not None:
+        first = levels.coloured**2 * np.trace(s.by_first[model.coloured, model.coloured])
+        slope["coloured"] = -2 * (s.by_drive[:, 3 * model.walks].sum() + first)
+    if model.wander is not None:
+        slope["wander"] = -2 * s.by_drive[:, -1].sum()
+    return value, slope
+
+
+def _excerpt(model: Linearized, loosened, kept):
+    """The model's fastest part, where it is long: levels need no more."""
+    N = len(model.start) - 1
+    if N <= _ENOUGH:
+        return model, loosened, kept
+    energy = np.cumsum(np.sum(model.motion.omega_B**2, axis=1))
+    first = int(np.argmax(energy[_ENOUGH:] - energy[:-_ENOUGH]))
+    rows = slice(first, first + _ENOUGH)
+    read = slice(model.start[first], model.start[first + _ENOUGH])
+    part = replace(
+        model, A=model.A[rows], b=model.b[rows], which=model.which[rows], start=model.start[first : first + _ENOUGH + 1] - read.start,
+        H=model.H[read], y=model.y[read], Z=model.Z[read], kind=model.kind[read], unit=model.unit[read],
+    )  # fmt: skip
+    return part, loosened[rows], kept[read]
+
+
+def _reweighted(model: Linearized, levels: Levels, loosened, kept, around, outliers: bool):
+    """Each step's own variance by its posterior mean, Student-t; and which readings are out."""
+    steps = model.at(levels, loosened, kept)
+    f, whole, _ = _pass(steps, model.layout, around)
+    s = smooth(steps, f, whole)
+    parts = np.repeat([3, 2], 3)[: loosened.shape[1]]  # of a step: angle, rate, acceleration; angle, rate
+    square = loosened * (parts + 2 * s.by_drive[:, : len(parts)])  # E[w^T Q^-1 w]
+    wanted = (_FREEDOM + np.maximum(square, 0.0)) / (_FREEDOM + parts)
+    loosened = np.minimum(loosened * (wanted / loosened) ** _STRIDE, _LOOSEST)
+    if not outliers:
+        return loosened, kept
+    spread = s.error**2 - 2 * s.by_noise / steps.R  # of the pull: alone = pull / sqrt(spread)
+    alone = np.abs(s.error) / np.sqrt(np.maximum(spread, 1e-300))
+    sigma = np.sqrt(np.where(kept, steps.R, steps.R / 1e12))
+    again = np.abs(steps.R * s.error) < _IN * sigma
+    return loosened, np.where(kept, alone < _OUT, again)
+
+
+def carried(loosened: np.ndarray, old: Motion, new: Motion) -> np.ndarray:
+    """The same steps' variances on other instants."""
+    return loosened[np.clip(np.searchsorted(old.time_s, new.time_s), 0, len(loosened) - 1)]
+
+
+def _near(a: Levels, b: Levels) -> bool:
+    return all(
+        abs(np.log(getattr(b, n) / getattr(a, n))) < 0.03 for n in ("wheel", "rate", "attitude", "coloured")
+    ) and (abs(b.wander - a.wander) <= 0.05 * a.wander)
+
+
+def _median(sigmas: list[float], otherwise: float) -> float:
+    known = [s for s in sigmas if np.isfinite(s)]
+    return float(np.median(known)) if known else otherwise
+
+
+def first_levels(record: SlewRecord) -> Levels:
+    """Rough ones, from third differences."""
+    m, g, a = record.momentum, record.rates, record.attitude
+    d = m.direction.round(9)
+    of = [np.flatnonzero((d == u).all(axis=1)) for u in np.unique(d, axis=0)]
+    wheel = _median([third_difference_sigma(m.value_Nms[i] / m.unit[i] * np.sqrt(m.count[i])) for i in of], 1e-2)
+    rate = _median([third_difference_sigma((g.value_rad_s * np.sqrt(g.count))[g.axis == j]) for j in range(3)], 1e-6)
+    attitude = 1e-5
+    if record.has_attitude:
+        r = rotation(a.q_NB)
+        steps = (r[:-1].inv() * r[1:]).as_rotvec() * np.sqrt(a.count[1:, None])
+        attitude = _median([third_difference_sigma(np.cumsum(step)) for step in steps.T], 1e-5)
+    jerk = np.median(np.abs(g.value_rad_s)) * 1e-3 + 1e-9 if record.has_rates else 1e-6
+    return Levels(max(wheel, 1e-9), max(rate, 1e-12), max(attitude, 1e-9), max(attitude, 1e-9), 15.0, float(jerk))
+
+
+def _start(record: SlewRecord, layout: Layout, quick: bool) -> tuple[np.ndarray, Motion]:
+    """Plain least squares of momentum (001 eq 11, the momentum free), at the time offset that fits best."""
+    beta = np.zeros(layout.size)
+    if layout.skew_rates is not None:
+        beta[layout.skew_rates] = _rates_late(record)
+    late = {skew: plain_fit(record, layout, beta, skew, quick) for skew in _SKEWS_TRIED}
+    least = min(left for _, left in late.values())
+    skew = min(late, key=lambda s: (late[s][1] > 1.02 * least, abs(s)))
+    beta = late[skew][0]
+    motion = first_motion(_shifted(record, layout, beta), instants(record, layout, beta))
+    return beta, motion
+
+
+def _shifted(record: SlewRecord, layout: Layout, beta) -> SlewRecord:
+    """Rates at mended times."""
+    if layout.skew_rates is None or beta[layout.skew_rates] == 0:
+        return record
+    return replace(record, rates=replace(record.rates, time_s=record.rates.time_s + beta[layout.skew_rates]))
+
+
+def _rates_late(record: SlewRecord) -> float:
+    """By how much the rates' time stamps must be moved for them to match the attitude's, roughly. [s]"""
+    tq, r = record.attitude.time_s, rotation(record.attitude.q_NB)
+    tg, w = record.common_rates()
+    mid, mean = tq[:-1] + np.diff(tq) / 2, (r[:-1].inv() * r[1:]).as_rotvec() / np.diff(tq)[:, None]
+    misfit = {
+        s: sum(np.sum((np.interp(mid, tg + s, w[:, j]) - mean[:, j]) ** 2) for j in range(3)) for s in _SKEWS_TRIED
+    }
+    least = min(misfit.values())
+    return min((s for s in misfit if misfit[s] <= 1.02 * least), key=abs)
+
+
+def plain_fit(
+    record: SlewRecord, layout: Layout, beta: np.ndarray, skew: float, quick: bool = False
+) -> tuple[np.ndarray, float]:
+    """Tensor and momenta by least squares of momentum alone, wheels ``skew`` s later: beta and the squares left over.
+
+    ``quick``: of its changes from one reading to the next, in which outside torques hardly show."""
+    beta = beta.copy()
+    beta[layout.skew_wheels] = skew
+    m = record.momentum
+    times = np.unique(m.time_s + skew)
+    motion = first_motion(_shifted(record, layout, beta), times)
+    k = np.searchsorted(times, m.time_s + skew)
+    columns = np.zeros((len(k), 6 + 3 * layout.arcs))
+    columns[:, :6] = -np.einsum("ni,nik->nk", m.direction, momentum_regressor(motion.omega_B[k]))
+    inertial = rotation(motion.q_NB[k]).apply(m.direction)
+    for arc in range(layout.arcs):
+        here = m.arc == arc
+        columns[here, layout.momentum(arc)] = inertial[here]
+    value = m.value_Nms
+    if quick:
+        order = np.lexsort((m.time_s, *m.direction.T, m.arc))
+        same = (m.direction[order[1:]] == m.direction[order[:-1]]).all(axis=1) & (np.diff(m.arc[order]) == 0)
+        value = np.diff(value[order])[same]
+        columns = np.diff(columns[order], axis=0)[same]
+    size = np.sqrt(np.sum(columns**2, axis=0))
+    size[size == 0] = 1.0
+    good = np.ones(len(value), bool)
+    for _ in range(1 if quick else 3):  # a few wild readings must not decide where the fit starts
+        found, *_ = np.linalg.lstsq(columns[good] / size, value[good], rcond=1e-6)
+        left = value - columns @ (found / size)
+        good = np.abs(left) <= 8 * np.median(np.abs(left)) + 1e-300
+    beta[: len(found)] = found / size
+    return beta, float(np.sum(left[good] ** 2))

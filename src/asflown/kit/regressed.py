@@ -1,0 +1,199 @@
+"""Kalman filter and smoother in which every step may differ, with unknown constants regressed along the way.
+
+    x[k] = A[k] x[k-1] + b[k] + w[k],   cov w[k] = sum_j scale[k, j] driven[j, kind[k]]
+    y[m] = H[m] x + Z[m] beta + v[m],   var v[m] = R[m]
+
+The filter is linear in what it is given, so it takes y and every column of Z through the same gains; generalized
+least squares on the innovations then gives beta with no prior on it, exactly.  The backward pass is that of the
+smoothed disturbances (de Jong 1989; modified Bryson-Frazier): its adjoint also gives the slope of the likelihood in
+every variance, for the price of one pass.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .compiled import jit
+
+
+@dataclass(frozen=True)
+class Steps:
+    """N steps of n states; measurements sorted by step, those of step k are [start[k], start[k + 1])."""
+
+    A: np.ndarray  # (N, n, n); A[0] is not used
+    b: np.ndarray  # (N, n); b[0] is not used
+    driven: np.ndarray  # (J, kinds, n, n)
+    kind: np.ndarray  # (N,) int
+    scale: np.ndarray  # (N, J); scale[0] is not used
+    start: np.ndarray  # (N + 1,) int
+    H: np.ndarray  # (M, n)
+    y: np.ndarray  # (M,)
+    Z: np.ndarray  # (M, p)
+    R: np.ndarray  # (M,)
+    covariance: np.ndarray  # (n, n), of a first state whose mean is zero
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """Innovations of y and of every column of Z (M, 1 + p), their variance (M,), and what smoothing needs."""
+
+    innovation: np.ndarray
+    variance: np.ndarray
+    product: np.ndarray  # (M, n), P H^T before each measurement
+    mean: np.ndarray  # (N, n, 1 + p), before each step's measurements
+    covariances: np.ndarray  # (N, n, n), likewise
+
+    @property
+    def information(self) -> np.ndarray:
+        """Of y and beta together, (1 + p, 1 + p): E^T diag(1 / variance) E."""
+        scaled = self.innovation / np.sqrt(np.where(self.variance > 0, self.variance, np.nan))[:, None]
+        return scaled.T @ scaled
+
+    def log_likelihood(self, beta: np.ndarray) -> float:
+        e = self.innovation @ np.concatenate([[1.0], -beta])
+        return float(-0.5 * np.sum(e**2 / self.variance + np.log(2 * np.pi * self.variance)))
+
+
+@dataclass(frozen=True)
+class Disturbances:
+    """Smoothed at one beta: states (N, n), their covariances (N, n, n), measurement errors (M,) over their R.
+
+    ``by_noise`` (M,), ``by_drive`` (N, J): slope of the log likelihood in the log of each variance;
+    ``by_first``: its matrix of slopes in the first state's covariance."""
+
+    mean: np.ndarray
+    covariances: np.ndarray
+    error: np.ndarray
+    by_noise: np.ndarray
+    by_drive: np.ndarray
+    by_first: np.ndarray
+
+
+def run(steps: Steps) -> Filtered:
+    """The forward pass."""
+    given = np.column_stack([steps.y, steps.Z])
+    return Filtered(*_forward(
+        _c(steps.A), _c(steps.b), _c(steps.driven), _i(steps.kind), _c(steps.scale), _i(steps.start), _c(steps.H),
+        _c(given), _c(steps.R), _c(steps.covariance),
+    ))  # fmt: skip
+
+
+def smooth(steps: Steps, filtered: Filtered, beta: np.ndarray) -> Disturbances:
+    """The backward pass, for one value of the constants."""
+    share = np.concatenate([[1.0], -np.asarray(beta, float)])
+    e = filtered.innovation @ share
+    mean = filtered.mean @ share
+    return Disturbances(*_backward(
+        _c(steps.A), _c(steps.driven), _i(steps.kind), _c(steps.scale), _i(steps.start), _c(steps.H), _c(steps.R),
+        _c(e), filtered.variance, filtered.product, _c(mean), filtered.covariances,
+    ))  # fmt: skip
+
+
+def _c(x) -> np.ndarray:
+    return np.ascontiguousarray(x, dtype=float)
+
+
+def _i(x) -> np.ndarray:
+    return np.ascontiguousarray(x, dtype=np.int64)
+
+
+@jit
+def _forward(A, b, driven, kind, scale, start, H, given, R, first):
+    N, n = len(kind), A.shape[1]
+    M, columns = given.shape
+    innovation, variance, product = np.empty((M, columns)), np.empty(M), np.empty((M, n))
+    mean, covariances = np.empty((N, n, columns)), np.empty((N, n, n))
+    x, P, left = np.zeros((n, columns)), first.copy(), np.empty(n)
+    for k in range(N):
+        if k > 0:
+            x = A[k] @ x
+            P = A[k] @ P @ A[k].T
+            for i in range(n):
+                x[i, 0] += b[k, i]
+            for j in range(driven.shape[0]):
+                P += scale[k, j] * driven[j, kind[k]]
+        mean[k] = x
+        covariances[k] = P
+        for m in range(start[k], start[k + 1]):
+            s = R[m]
+            for i in range(n):
+                total = 0.0
+                for c in range(n):
+                    total += P[i, c] * H[m, c]
+                product[m, i] = total
+            for i in range(n):
+                s += H[m, i] * product[m, i]
+            variance[m] = s
+            for c in range(columns):
+                e = given[m, c]
+                for i in range(n):
+                    e -= H[m, i] * x[i, c]
+                innovation[m, c] = e
+                for i in range(n):
+                    x[i, c] += product[m, i] / s * e
+            # (1 - K h) P (1 - K h)^T + K R K^T: stays a covariance where the plain difference would round below zero
+            for i in range(n):
+                for c in range(n):
+                    P[i, c] -= product[m, i] / s * product[m, c]
+            for i in range(n):
+                left[i] = 0.0
+                for c in range(n):
+                    left[i] += P[i, c] * H[m, c]
+            for i in range(n):
+                for c in range(n):
+                    P[i, c] += (product[m, i] * R[m] / s - left[i]) * product[m, c] / s
+            for i in range(n):
+                for c in range(i):
+                    P[i, c] = P[c, i] = 0.5 * (P[i, c] + P[c, i])
+    return innovation, variance, product, mean, covariances
+
+
+@jit
+def _backward(A, driven, kind, scale, start, H, R, e, variance, product, mean, covariances):
+    N, n = len(kind), A.shape[1]
+    error, by_noise = np.empty(len(R)), np.empty(len(R))
+    by_drive = np.zeros(scale.shape)
+    r, S = np.zeros(n), np.zeros((n, n))  # adjoint and its covariance
+    gain, Sg = np.empty(n), np.empty(n)
+    smoothed, spread = np.empty((N, n)), np.empty((N, n, n))
+    for k in range(N - 1, -1, -1):
+        for m in range(start[k + 1] - 1, start[k] - 1, -1):
+            s = variance[m]
+            pull, weight = e[m] / s, 1.0 / s
+            for i in range(n):
+                gain[i] = product[m, i] / s
+            for i in range(n):
+                total = 0.0
+                for c in range(n):
+                    total += S[i, c] * gain[c]
+                Sg[i] = total
+            for i in range(n):
+                pull -= gain[i] * r[i]
+                weight += gain[i] * Sg[i]
+            error[m] = pull  # E[v] = R pull, var v = R - R^2 weight
+            by_noise[m] = 0.5 * R[m] * (pull**2 - weight)
+            for i in range(n):
+                r[i] += H[m, i] * pull
+            for i in range(n):
+                for c in range(n):
+                    S[i, c] += weight * H[m, i] * H[m, c] - H[m, i] * Sg[c] - Sg[i] * H[m, c]
+        P = covariances[k]
+        smoothed[k] = mean[k] + P @ r
+        spread[k] = P - P @ S @ P
+        if k > 0:
+            for j in range(driven.shape[0]):
+                D = driven[j, kind[k]]
+                total = 0.0
+                for i in range(n):
+                    for c in range(n):
+                        total += D[i, c] * (r[i] * r[c] - S[i, c])
+                by_drive[k, j] = 0.5 * scale[k, j] * total
+            r = A[k].T @ r
+            S = A[k].T @ S @ A[k]
+    by_first = np.empty((n, n))
+    for i in range(n):
+        for c in range(n):
+            by_first[i, c] = 0.5 * (r[i] * r[c] - S[i, c])
+    return smoothed, spread, error, by_noise, by_drive, by_first
