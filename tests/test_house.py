@@ -15,14 +15,15 @@ MAY_IMPORT = {
     "kit": set(),
     "craft": {"kit"},
     "telemetry": {"kit", "craft"},
+    "maneuvers": {"kit", "telemetry"},
     "dynamics": {"kit", "craft"},
-    "sim": {"kit", "craft", "telemetry"},
-    "estimate": {"kit", "craft", "telemetry", "dynamics"},
-    "plots": {"kit", "craft", "telemetry", "dynamics", "estimate", "trends"},
+    "sim": {"kit", "craft", "telemetry", "maneuvers"},
+    "estimate": {"kit", "craft", "telemetry", "maneuvers", "dynamics"},
+    "plots": {"kit", "craft", "telemetry", "maneuvers", "dynamics", "estimate", "trends"},
     "trends": {"kit", "craft", "telemetry", "dynamics", "estimate"},
     "campaigns": {"kit", "craft", "telemetry", "dynamics", "sim", "estimate", "trends"},
     "report": {"kit", "estimate", "trends", "plots"},
-    "cli": {"kit", "craft", "telemetry", "dynamics", "sim", "estimate", "trends", "plots", "campaigns", "report"},
+    "cli": {"kit", "craft", "telemetry", "maneuvers", "dynamics", "sim", "estimate", "trends", "plots", "campaigns", "report"},
 }
 
 
