@@ -17,6 +17,7 @@ TEXTS = {
     "telemetry-check": ["telemetry", "check", "t.csv"],
     "craft-show-cassini": ["craft", "show", "cassini", "--at", "2005-02-09"],
     "craft-list": ["craft", "list"],
+    "gates-history": ["gates", "history"],
     "help": ["--help"],
 }  # fmt: skip
 

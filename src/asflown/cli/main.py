@@ -10,7 +10,7 @@ import sys
 
 import typer
 
-from . import budget, craft, demo, report, simulate, telemetry, torque, trend, tune, wheels
+from . import budget, craft, demo, gates, report, simulate, telemetry, torque, trend, tune, wheels
 
 app = typer.Typer(help=__doc__, add_completion=False, rich_markup_mode=None)
 app.command("torque", short_help="Reconstruct the disturbance torque.")(torque.torque)
@@ -21,6 +21,7 @@ app.command("tune", short_help="The papers' search for a smoothing span.")(tune.
 app.command("demo", short_help="Fly the papers' cases and reconstruct them.")(demo.demo)
 app.command("report", short_help="One page for the anomaly board.")(report.report)
 app.add_typer(trend.app, name="trend", short_help="An actuator's health over years: add, list, show, compare, watch.")
+app.add_typer(gates.app, name="gates", short_help="Maneuver execution errors: fit, judge, watch, predict.")
 app.add_typer(telemetry.app, name="telemetry", short_help="Check a telemetry file; list channel names.")
 app.add_typer(craft.app, name="craft", short_help="List, show and check crafts.")
 
