@@ -23,7 +23,19 @@ MAY_IMPORT = {
     "trends": {"kit", "craft", "telemetry", "dynamics", "estimate"},
     "campaigns": {"kit", "craft", "telemetry", "dynamics", "sim", "estimate", "trends"},
     "report": {"kit", "estimate", "trends", "plots"},
-    "cli": {"kit", "craft", "telemetry", "maneuvers", "dynamics", "sim", "estimate", "trends", "plots", "campaigns", "report"},
+    "cli": {
+        "kit",
+        "craft",
+        "telemetry",
+        "maneuvers",
+        "dynamics",
+        "sim",
+        "estimate",
+        "trends",
+        "plots",
+        "campaigns",
+        "report",
+    },
 }
 
 

@@ -1,15 +1,121 @@
-"""The verb `gates`."""
+"""The verb `gates`: fit and history."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import typer
+from typer.core import TyperGroup
 
 from .options import JSON
 from .output import print_doubts, print_json, provenance
 
+
+class _FitUnlessNamed(TyperGroup):
+    """`asflown gates FILE` is `asflown gates fit FILE`: what is no verb of the group is a file or an option of the fit."""
+
+    def parse_args(self, ctx, args):
+        if args and args[0] not in self.commands and args[0] != "--help":
+            args = ["fit", *args]
+        return super().parse_args(ctx, args)
+
+
 app = typer.Typer(
-    help="How well an engine executes its maneuvers: the Gates model.", no_args_is_help=True, rich_markup_mode=None
-)
+    cls=_FitUnlessNamed, help="How well an engine executes its maneuvers: `asflown gates FILE` fits a Gates model.",
+    no_args_is_help=True, rich_markup_mode=None,
+)  # fmt: skip
+
+FILE = typer.Argument(help="Maneuvers: CSV (plain or gzip), Parquet or TOML (docs/maneuvers.md).")
+ENGINE = typer.Option(None, "--engine", help="Which engine's, where the file holds several.")
+WITHOUT = typer.Option(None, "--without", help='Maneuvers left out, as in "OTM-264,OTM-265".')
+AGAINST = typer.Option(None, "--against", help="A model of the history, as in 2012-1 or rcs/2012-1.")
+
+
+@app.command(short_help="Fit a model; `fit` may be left out.")
+def fit(
+    file: Path = FILE,
+    engine: str = ENGINE,
+    model: str = typer.Option("estimated-bias", "--model", help="estimated-bias, zero-mean or mean-aware."),
+    likelihood: str = typer.Option("additive", "--likelihood", help="additive, printed or unweighted."),
+    hold: list[str] = typer.Option(
+        [],
+        "--hold",
+        help='A term kept: "pointing_fixed=0 mm/s", "pointing_fixed=2000", "pointing=2000"; may be repeated.',
+    ),
+    prior: str = typer.Option(
+        None, "--prior", help="An earlier model whose sigmas are taken as a prior, as in 2008-01."
+    ),
+    prior_width: float = typer.Option(0.5, "--prior-width", help="Its width, in parts of each sigma."),
+    without: str = WITHOUT,
+    bootstrap: int = typer.Option(0, "--bootstrap", min=0, max=100_000, help="Parametric refits."),
+    seed: int = typer.Option(0, "--seed", min=0, help="Of the bootstrap."),
+    json: bool = JSON,
+) -> None:
+    """Fixed and proportional sigmas and biases of magnitude and pointing, with intervals and doubts."""
+    from asflown.estimate.gates_fit import fit_gates
+
+    burns = maneuvers_from(file, engine, without)
+    result = fit_gates(
+        burns, model=model, likelihood=likelihood, hold=held(hold, burns), prior=model_named(prior, burns), prior_width=prior_width,
+        bootstrap=bootstrap, seed=seed,
+    )  # fmt: skip
+    options = {
+        "engine": engine, "model": model, "likelihood": likelihood, "hold": hold, "prior": prior, "prior_width": prior_width,
+        "without": without, "bootstrap": bootstrap,
+    }  # fmt: skip
+    origin = provenance({burns.source: burns.sha256}, options, seed if bootstrap else None)
+    if json:
+        print_json({"command": "gates"} | result.record() | {"doubts": list(result.doubts), "provenance": origin})
+        return
+    print(result)
+    print_doubts(result.doubts)
+
+
+def maneuvers_from(file: Path, engine: str | None, without: str | None):
+    """The maneuvers of one engine, without some."""
+    from asflown.maneuvers.table import load_maneuvers
+
+    burns = load_maneuvers(file).of(engine)
+    return burns if without is None else burns.without([w.strip() for w in without.split(",")], "left out by --without")
+
+
+def model_named(name: str | None, burns):
+    """A model of the history; the maneuvers' engine says whose where the name does not."""
+    from asflown.maneuvers.history import past_model
+
+    return None if name is None else past_model(name, burns.engine[0]).model
+
+
+def held(asked: list[str], burns) -> dict[str, float]:
+    """'pointing_fixed=0 mm/s' or 'pointing=2000' (a model of the history) -> terms and their values."""
+    from asflown.estimate.gates_fit import TERMS
+    from asflown.kit.errors import BadInput, some_of
+    from asflown.kit.quantities import quantity
+
+    found: dict[str, float] = {}
+    for text in asked:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        terms = [t for t in TERMS if t == name or t.startswith(f"{name}_")]
+        if not equals or not terms:
+            raise BadInput(
+                f"--hold {text!r} names no term",
+                remedy=f"Write TERM=VALUE or TERM=MODEL; terms: {some_of(TERMS)}, magnitude, pointing.",
+            )
+        try:
+            record = model_named(value, burns).record()
+        except BadInput as why:
+            if len(terms) > 1:
+                raise BadInput(f"--hold {text!r}: {why.what}", remedy=why.remedy) from None
+            unit = "m/s" if name.endswith("fixed") else "rad" if name.startswith("pointing") else ""
+            found[name] = quantity(value, unit)
+            continue
+        for t in terms:
+            part, _, kind = t.partition("_")
+            found[t] = record[part]["fixed_mps"] if kind == "fixed" else record[part][_PROPORTIONAL[part]]
+    return found
+
+
+_PROPORTIONAL = {"magnitude": "proportional", "pointing": "proportional_rad"}
 
 
 @app.command(short_help="Cassini's models and biases through the years.")
