@@ -22,19 +22,3 @@ def maneuvers(gates, dv, sigma_od=0.0, seed=1, engine="rcs") -> Maneuvers:
         tuple(f"M{k + 1}" for k in range(n)), (engine,) * n, dv, magnitude, od, gates.mean_pointing(dv) + across,
         od[:, None, None] ** 2 * np.eye(2),
     )  # fmt: skip
-
-
-def csv_of(m: Maneuvers) -> str:
-    """The maneuvers as a table of resolved errors."""
-    lines = [HEAD.replace("time,", "")]
-    for k in range(len(m)):
-        c = m.pointing_covariance[k]
-        sx, sy = np.sqrt(np.diag(c))
-        r = c[0, 1] / (sx * sy) if sx * sy > 0 else 0.0
-        cells = [
-            m.dv_mps[k],
-            *(1e3 * x for x in (m.magnitude_error_mps[k], *m.pointing_error_mps[k], m.sigma_magnitude_mps[k], sx, sy)),
-            r,
-        ]
-        lines.append(",".join([m.id[k], m.engine[k], *(repr(float(x)) for x in cells)]))
-    return "\n".join(lines) + "\n"

@@ -15,8 +15,9 @@ from asflown.maneuvers.columns import NUMBERS, VECTORS, WORDS
 from asflown.maneuvers.frame import resolved, tvc_axes
 from asflown.maneuvers.history import past_model
 from asflown.maneuvers.table import load_maneuvers
+from asflown.maneuvers.write import maneuver_text
 
-from .sample import HEAD, csv_of, maneuvers
+from .sample import HEAD, maneuvers
 
 ROW = "A,2012-01-02T00:00:00,rcs,0.1,1,2,-3,0.2,0.3,0.4,0.5"
 RCS = past_model("rcs/2012-1").model
@@ -54,8 +55,8 @@ def test_the_same_table_from_parquet_toml_and_gzip(tmp_path):
     import duckdb
 
     m = maneuvers(RCS, [0.02, 0.1, 0.3], 1e-4)
-    plain = load_maneuvers(written(tmp_path, csv_of(m)))
-    (tmp_path / "m.csv.gz").write_bytes(gzip.compress(csv_of(m).encode()))
+    plain = load_maneuvers(written(tmp_path, maneuver_text(m)))
+    (tmp_path / "m.csv.gz").write_bytes(gzip.compress(maneuver_text(m).encode()))
     with duckdb.connect() as db:
         db.execute(
             f"COPY (SELECT * FROM read_csv('{tmp_path / 'm.csv'}')) TO '{tmp_path / 'm.parquet'}' (FORMAT parquet)"

@@ -1,4 +1,4 @@
-"""The verb `gates`: fit and history."""
+"""The verb `gates`: fit, watch, predict and history."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ from pathlib import Path
 import typer
 from typer.core import TyperGroup
 
+from .gates_simulate import simulate
+from .gates_watch import predict, watch
+from .maneuver_options import AGAINST, ENGINE, FILE, PLOT_DIR, WITHOUT, held, maneuvers_from, past_named, removed_bias
 from .options import JSON
-from .output import print_doubts, print_json, provenance
+from .output import print_doubts, print_json, provenance, say
 
 
 class _FitUnlessNamed(TyperGroup):
@@ -21,17 +24,12 @@ class _FitUnlessNamed(TyperGroup):
 
 
 app = typer.Typer(
-    cls=_FitUnlessNamed, help="How well an engine executes its maneuvers: `asflown gates FILE` fits a Gates model.",
+    cls=_FitUnlessNamed, help="How well an engine executes its maneuvers: `asflown gates FILE` fits a Gates model and judges it.",
     no_args_is_help=True, rich_markup_mode=None,
 )  # fmt: skip
 
-FILE = typer.Argument(help="Maneuvers: CSV (plain or gzip), Parquet or TOML (docs/maneuvers.md).")
-ENGINE = typer.Option(None, "--engine", help="Which engine's, where the file holds several.")
-WITHOUT = typer.Option(None, "--without", help='Maneuvers left out, as in "OTM-264,OTM-265".')
-AGAINST = typer.Option(None, "--against", help="A model of the history, as in 2012-1 or rcs/2012-1.")
 
-
-@app.command(short_help="Fit a model; `fit` may be left out.")
+@app.command(short_help="Fit a model and judge it; `fit` may be left out.")
 def fit(
     file: Path = FILE,
     engine: str = ENGINE,
@@ -46,76 +44,81 @@ def fit(
         None, "--prior", help="An earlier model whose sigmas are taken as a prior, as in 2008-01."
     ),
     prior_width: float = typer.Option(0.5, "--prior-width", help="Its width, in parts of each sigma."),
+    against: str = AGAINST,
     without: str = WITHOUT,
+    patch: str = typer.Option(
+        None, "--patch", help="First burn flown after a patch: compare the burns before and after it."
+    ),
+    removed: str = typer.Option(
+        None, "--removed", help='Bias it took out, as in "-4 mm/s" or "-4 mm/s, 0.03 %"; taken out of the burns before.'
+    ),
     bootstrap: int = typer.Option(0, "--bootstrap", min=0, max=100_000, help="Parametric refits."),
-    seed: int = typer.Option(0, "--seed", min=0, help="Of the bootstrap."),
+    seed: int = typer.Option(0, "--seed", min=0, help="Of bootstrap and envelopes."),
+    plot_dir: Path = PLOT_DIR,
+    report: Path = typer.Option(
+        None, "--report", help="One page (HTML) with verdict, tables and figures; its JSON twin beside it."
+    ),
     json: bool = JSON,
 ) -> None:
-    """Fixed and proportional sigmas and biases of magnitude and pointing, with intervals and doubts."""
+    """Fixed and proportional sigmas and biases of magnitude and pointing, with intervals, outliers, influence and doubts."""
     from asflown.estimate.gates_fit import fit_gates
+    from asflown.estimate.gates_judge import judge
+    from asflown.estimate.gates_patch import across_patch
+    from asflown.kit.errors import BadInput
+    from asflown.kit.files import check_folder
 
+    if removed is not None and patch is None:
+        raise BadInput(
+            "--removed without --patch", remedy="Name the first burn after the patch, as in --patch OTM-330."
+        )
+    if plot_dir is not None:
+        check_folder(plot_dir)
+    if report is not None:
+        from asflown.report.gates_page import check_report
+
+        check_report(report)
     burns = maneuvers_from(file, engine, without)
+    whose = burns.engine[0]
+    compared = None
+    if patch is not None:
+        burns, compared = across_patch(burns, patch, *removed_bias(removed))
+    earlier = past_named(prior, whose)
     result = fit_gates(
-        burns, model=model, likelihood=likelihood, hold=held(hold, burns), prior=model_named(prior, burns), prior_width=prior_width,
-        bootstrap=bootstrap, seed=seed,
+        burns, model=model, likelihood=likelihood, hold=held(hold, whose), prior=None if earlier is None else earlier.model,
+        prior_width=prior_width, bootstrap=bootstrap, seed=seed,
     )  # fmt: skip
+    judged = judge(result, against=past_named(against, whose), seed=seed)
+    doubts = [*result.doubts, *judged.doubts, *(compared.doubts if compared else ())]
     options = {
         "engine": engine, "model": model, "likelihood": likelihood, "hold": hold, "prior": prior, "prior_width": prior_width,
-        "without": without, "bootstrap": bootstrap,
+        "against": against, "without": without, "patch": patch, "removed": removed, "bootstrap": bootstrap,
     }  # fmt: skip
-    origin = provenance({burns.source: burns.sha256}, options, seed if bootstrap else None)
+    record = {
+        "command": "gates", **result.record(), **judged.record(), "patch": None if compared is None else compared.record(),
+        "doubts": doubts, "provenance": provenance({burns.source: burns.sha256}, options, seed),
+    }  # fmt: skip
+    if plot_dir is not None:
+        from asflown.plots.maneuvers import gates_figures, save_figures
+
+        for path in save_figures(gates_figures(result, judged), plot_dir):
+            say(f"wrote {path}")
+    if report is not None:
+        from asflown.report.gates_page import write_gates_report
+
+        say(f"wrote {report} and {write_gates_report(result, judged, compared, record, report)}")
     if json:
-        print_json({"command": "gates"} | result.record() | {"doubts": list(result.doubts), "provenance": origin})
+        print_json(record)
         return
     print(result)
-    print_doubts(result.doubts)
+    print(judged)
+    if compared is not None:
+        print(compared)
+    print_doubts(doubts)
 
 
-def maneuvers_from(file: Path, engine: str | None, without: str | None):
-    """The maneuvers of one engine, without some."""
-    from asflown.maneuvers.table import load_maneuvers
-
-    burns = load_maneuvers(file).of(engine)
-    return burns if without is None else burns.without([w.strip() for w in without.split(",")], "left out by --without")
-
-
-def model_named(name: str | None, burns):
-    """A model of the history; the maneuvers' engine says whose where the name does not."""
-    from asflown.maneuvers.history import past_model
-
-    return None if name is None else past_model(name, burns.engine[0]).model
-
-
-def held(asked: list[str], burns) -> dict[str, float]:
-    """'pointing_fixed=0 mm/s' or 'pointing=2000' (a model of the history) -> terms and their values."""
-    from asflown.estimate.gates_fit import TERMS
-    from asflown.kit.errors import BadInput, some_of
-    from asflown.kit.quantities import quantity
-
-    found: dict[str, float] = {}
-    for text in asked:
-        name, equals, value = (part.strip() for part in text.partition("="))
-        terms = [t for t in TERMS if t == name or t.startswith(f"{name}_")]
-        if not equals or not terms:
-            raise BadInput(
-                f"--hold {text!r} names no term",
-                remedy=f"Write TERM=VALUE or TERM=MODEL; terms: {some_of(TERMS)}, magnitude, pointing.",
-            )
-        try:
-            record = model_named(value, burns).record()
-        except BadInput as why:
-            if len(terms) > 1:
-                raise BadInput(f"--hold {text!r}: {why.what}", remedy=why.remedy) from None
-            unit = "m/s" if name.endswith("fixed") else "rad" if name.startswith("pointing") else ""
-            found[name] = quantity(value, unit)
-            continue
-        for t in terms:
-            part, _, kind = t.partition("_")
-            found[t] = record[part]["fixed_mps"] if kind == "fixed" else record[part][_PROPORTIONAL[part]]
-    return found
-
-
-_PROPORTIONAL = {"magnitude": "proportional", "pointing": "proportional_rad"}
+app.command(short_help="Each new burn against the model before it: exit 3 on alarm.")(watch)
+app.command(short_help="Maneuvers executed by a model, as a table.")(simulate)
+app.command(short_help="Errors to be expected of burns yet to be flown.")(predict)
 
 
 @app.command(short_help="Cassini's models and biases through the years.")

@@ -292,12 +292,21 @@ class Problem:
         r = self.y - self.X @ (point.beta / self.bias_units)
         return float(np.sum(self.k * -0.5 * (LOG_2PI + np.log(s * self.size**2) + r * r / s)))
 
+    def at(self, fixed: float, proportional: float, beta) -> Point:
+        """A point of one's own choice; biases as many as the problem has."""
+        p = self.X.shape[1]
+        return Point(fixed, proportional, np.asarray(list(beta)[:p], float), np.nan, np.full((2, 2), np.nan))
+
     def refits(self, point: Point, count: int, rng: np.random.Generator) -> np.ndarray:
         """Fits of ``count`` sets drawn from a point's model: fixed, proportional and biases, (count, 2 + p)."""
         mean = self.X @ (point.beta / self.bias_units)
         sets = mean + np.sqrt(self.variances(point)) * rng.standard_normal((count, len(self.y)))
+        return self.refit_all(sets, point)
+
+    def refit_all(self, sets: np.ndarray, near: Point) -> np.ndarray:
+        """Fits of sets of this problem's rows (B, M), dimensionless: fixed, proportional and biases, (B, 2 + p)."""
         free = [h is None for h in self.held]
-        starts = self._starts(self.held, point)
+        starts = self._starts(self.held, near)
         found = _refits(sets, starts, *free, self.d, self.v**2, self.X, self.k, self.reml, np.array(self.prior))
         found[:, :2] = np.sqrt(found[:, :2]) * self.units
         found[:, 2:] *= self.bias_units

@@ -62,7 +62,22 @@ class Part:
     def bias_keys(self) -> tuple[str, str]:
         return "bias_fixed_mps", f"bias_{self.proportional_key}"
 
-    def _gathered(self, values) -> dict:
+    @property
+    def terms(self) -> list[str]:
+        """Names of all parameters in the problem's order."""
+        axes = [""] if self.name == "magnitude" else [" X", " Y"]
+        return [
+            "fixed",
+            "proportional",
+            *(f"bias{a}, {t}" for a in axes[: len(self.point.beta) // 2] for t in ("fixed", "proportional")),
+        ]
+
+    @property
+    def standard_errors(self) -> list[float | None]:
+        """One sigma of every parameter, from the widths of the intervals; None for what is held, open, or a limit (from zero)."""
+        return [_width(i) if i[0] else None for i in self.sigmas] + [_width(i) for i in self.biases]
+
+    def gathered(self, values) -> dict:
         """Values in the problem's order under the keys of the record; one number a key for magnitude, two for pointing."""
         values = list(values)
         keys = ("fixed_mps", self.proportional_key, *self.bias_keys)
@@ -75,9 +90,9 @@ class Part:
 
     def record(self) -> dict:
         numbers = [self.point.fixed, self.point.proportional, *self.point.beta]
-        values = self._gathered(numbers if self.known else [None] * len(numbers))
+        values = self.gathered(numbers if self.known else [None] * len(numbers))
         found = values | {
-            "ci95": self._gathered([None if i == (None, None) else list(i) for i in (*self.sigmas, *self.biases)]),
+            "ci95": self.gathered([None if i == (None, None) else list(i) for i in (*self.sigmas, *self.biases)]),
             "held": self.held,
             "log_likelihood": finite(self.log_likelihood),
             "log_likelihood_printed_normaliser": finite(self.log_likelihood_printed),
@@ -87,8 +102,8 @@ class Part:
             spread = np.std(self.drawn, axis=0, ddof=1)
             low, high = np.quantile(self.drawn, [0.025, 0.975], axis=0)
             found["bootstrap"] = {
-                "refits": len(self.drawn), "sd": self._gathered(spread.tolist()),
-                "ci95": self._gathered([list(x) for x in zip(low.tolist(), high.tolist(), strict=True)]),
+                "refits": len(self.drawn), "sd": self.gathered(spread.tolist()),
+                "ci95": self.gathered([list(x) for x in zip(low.tolist(), high.tolist(), strict=True)]),
                 "at_bound_share": dict(zip(("fixed", "proportional"), np.mean(self.drawn[:, :2] == 0, axis=0).tolist(), strict=True)),
             }  # fmt: skip
         return found
@@ -175,15 +190,9 @@ class GatesFit:
         ]
         for part in self.parts:
             lines.append(f"  {part.name}" + (" (per axis)" if part.name == "pointing" else ""))
-            names = ["fixed", "proportional"]
-            values = [part.point.fixed, part.point.proportional]
-            intervals = list(part.sigmas)
-            axes = [""] if part.name == "magnitude" else [" X", " Y"]
-            for a in axes[: len(part.point.beta) // 2]:
-                names += [f"bias{a}, fixed", f"bias{a}, proportional"]
-            values += list(part.point.beta)
-            intervals += list(part.biases)
-            for name, value, interval in zip(names, values, intervals, strict=True):
+            values = [part.point.fixed, part.point.proportional, *part.point.beta]
+            intervals = [*part.sigmas, *part.biases]
+            for name, value, interval in zip(part.terms, values, intervals, strict=True):
                 scale, unit = _READ["fixed" if name.endswith("fixed") else part.name]
                 if name in part.held:
                     said, within = f"{scale * value:.3g} {unit}", "held"
@@ -199,6 +208,12 @@ class GatesFit:
                     said, within = f"{_digits(scale * value)} {unit}", _between(interval, scale, unit)
                 lines.append(f"    {name:22s} {said:>14s}   {within}".rstrip())
         return "\n".join(lines)
+
+
+def _width(interval: Interval) -> float | None:
+    """One sigma of what lies in a 95 % interval; None where an end is open."""
+    low, high = interval
+    return None if low is None or high is None else (high - low) / 3.92
 
 
 def _between(interval: Interval, scale: float, unit: str) -> str:

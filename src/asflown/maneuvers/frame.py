@@ -6,6 +6,8 @@ import numpy as np
 
 from ..kit.errors import BadInput, some_of
 
+#: Nothing smaller is a maneuver. [m/s]
+SMALLEST = 1e-6
 #: Sine of the smallest angle between the dV and the craft's X axis.  Nearer than that, an error of the axis of a
 #: microradian would turn the whole frame about the dV by a milliradian.
 _NEAREST = 1e-3
@@ -22,7 +24,7 @@ def tvc_axes(expected_dv_N, craft_x_N, ids=None) -> np.ndarray:
     dv, x = np.atleast_2d(np.asarray(expected_dv_N, float)), np.atleast_2d(np.asarray(craft_x_N, float))
     names = [str(k + 1) for k in range(len(dv))] if ids is None else list(ids)
     size, length = np.linalg.norm(dv, axis=1), np.linalg.norm(x, axis=1)
-    _refuse(size <= 0, names, "the expected dV is zero", "A maneuver has an expected dV; leave others out.")
+    _refuse(size < SMALLEST, names, "the expected dV is zero", "A maneuver has an expected dV; leave others out.")
     _refuse(
         np.abs(length - 1) > _UNIT, names, "craft_x is not a unit vector",
         "Give the spacecraft's X axis as a direction in inertial axes, of length 1.",

@@ -14,7 +14,7 @@ from ..kit.errors import BadInput, some_of
 from ..kit.files import sha256_of
 from .adjust import SCALE, Adjustment, Ledger, entered, scale_corrected
 from .columns import Columns, read_table
-from .frame import resolved, tvc_axes
+from .frame import SMALLEST, resolved, tvc_axes
 
 #: Parts of the expected dV, each rounded to 0.1 mm/s, add up to it within this. [m/s]
 _ROUNDED = 2e-4
@@ -55,9 +55,18 @@ class Maneuvers:
         return sorted(set(self.engine))
 
     @property
+    def across(self) -> tuple[np.ndarray, np.ndarray]:
+        """Pointing errors (N, 2) and their covariance (N, 2, 2).  Raises BadInput where there are none."""
+        if self.pointing_error_mps is None or self.pointing_covariance is None:
+            raise BadInput(
+                "there are no pointing errors", file=self.source or None, remedy="Give pointing_error_x and _y."
+            )
+        return self.pointing_error_mps, self.pointing_covariance
+
+    @property
     def sigma_pointing_mps(self) -> np.ndarray:
         """Semi-major axis of the one-sigma ellipse of each pointing error, (N,)."""
-        return np.sqrt(np.maximum(np.linalg.eigvalsh(np.asarray(self.pointing_covariance))[:, -1], 0))
+        return np.sqrt(np.maximum(np.linalg.eigvalsh(self.across[1])[:, -1], 0))
 
     def place(self, id: str) -> int:
         """Where a maneuver stands.  Raises BadInput for an id that is not there."""
@@ -269,7 +278,7 @@ def _expected(columns: Columns, parts: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def _positive(columns: Columns, name: str, values) -> None:
-    for row in np.flatnonzero(~(values > 0))[:1]:
+    for row in np.flatnonzero(values < SMALLEST)[:1]:
         raise columns.wrong(int(row), name, f"{values[row]:g} m/s is not the size of a maneuver", "A dV is positive.")
 
 
