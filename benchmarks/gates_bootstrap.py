@@ -3,7 +3,7 @@
     python benchmarks/gates_bootstrap.py
 
 Both maximise the same restricted likelihood, biases solved for inside; scipy's bounded quasi-Newton (L-BFGS-B) with the gradient
-by differences, as one writes it down, from the one start that the truth is, while asflown looks from three.  Wanted: 30 times.
+by differences, as one writes it down, from the one start that the truth is, while asflown looks from an edge too.  Wanted: 30 times.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ import argparse
 
 import numpy as np
 
-from asflown.estimate.gates_watch import alarm_chance, watch
+from asflown.estimate.gates_watch import alarm_chance, watch_maneuvers
 from asflown.maneuvers.history import past_model
 from asflown.sim.maneuver_sets import A_BRANCH_END, a_branch
 
@@ -23,7 +23,7 @@ SHOWN = ("OTM-160", "OTM-169")
 def story(weaker: float, seed, given: bool = False) -> tuple[bool, bool, bool, bool, float]:
     """An alarm before; at either burn by that burn alone; in any way; OTM-166 among them; the power beforehand."""
     past = past_model("rcs/2008-01")
-    w = watch(a_branch(past.model, weaker, seed), against=past if given else None)
+    w = watch_maneuvers(a_branch(past.model, weaker, seed), against=past if given else None)
     by = {b.id: b for b in w.burns}
     missed = np.prod([1 - alarm_chance(by[i].foreseen, weaker * by[i].dv_mps, w.limit_p) for i in SHOWN])
     return (

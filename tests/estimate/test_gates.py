@@ -1,5 +1,6 @@
 """Fitted Gates models: against exact answers, laws, and many simulated sets."""
 
+import json
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,10 @@ from scipy import optimize, stats
 
 from asflown.estimate.gates_fit import FEWEST, fit_gates, problems
 from asflown.estimate.gates_intervals import _cuts
+from asflown.estimate.gates_judge import judge_gates
+from asflown.estimate.gates_watch import watch_maneuvers
 from asflown.kit.errors import BadInput
+from asflown.kit.plain import plain
 from asflown.maneuvers.history import past_model
 from asflown.maneuvers.model import Gates
 from asflown.sim.maneuver_sets import MAIN_ENGINE_SET, RCS_SET, execute
@@ -141,6 +145,34 @@ def test_any_number_of_burns_is_answered(count, main_set):
     assert str(fit) and fit.record()
     if count <= 2:  # two measurements do not determine four parameters: 002 Appendix B says they do
         assert fit.record()["magnitude"]["ci95"]["fixed_mps"] is None
+
+
+def strange(m, what: str):
+    n = len(m)
+    none = {"sigma_magnitude_mps": np.zeros(n), "pointing_covariance": np.zeros((n, 2, 2))}
+    return {
+        "one size": lambda: replace(m, dv_mps=np.full(n, 0.1)),
+        "no errors": lambda: replace(m, magnitude_error_mps=np.zeros(n), pointing_error_mps=np.zeros((n, 2))),
+        "no errors at all": lambda: replace(m, magnitude_error_mps=np.zeros(n), pointing_error_mps=np.zeros((n, 2)), **none),
+        "no tracking errors": lambda: replace(m, **none),
+        "on a line": lambda: replace(m, magnitude_error_mps=0.01 * m.dv_mps, **none),
+        "nothing tracked": lambda: replace(m, sigma_magnitude_mps=np.ones(n), pointing_covariance=np.tile(np.eye(2), (n, 1, 1))),
+        "ellipses without width": lambda: replace(m, pointing_covariance=np.tile(1e-8 * np.ones((2, 2)), (n, 1, 1))),
+        "huge": lambda: replace(m, magnitude_error_mps=1e6 * m.magnitude_error_mps),
+        "all sizes": lambda: replace(m, dv_mps=np.geomspace(1e-5, 1e5, n)),
+    }[what]()  # fmt: skip
+
+
+@pytest.mark.parametrize("what", ["one size", "no errors", "no errors at all", "no tracking errors", "on a line", "nothing tracked",
+                                  "ellipses without width", "huge", "all sizes"])  # fmt: skip
+@pytest.mark.parametrize("likelihood", ["additive", "unweighted"])
+def test_strange_burns_are_answered_in_finite_numbers(what, likelihood, main_set):
+    fit = fit_gates(strange(main_set, what), likelihood=likelihood, bootstrap=5)
+    judged = judge_gates(fit, draws=10, against=past_model("main/2012-1"))
+    json.dumps(plain(fit.record() | judged.record()), allow_nan=False)
+    assert str(fit) and str(judged) and np.isfinite(values(fit)).all()
+    watched = watch_maneuvers(strange(main_set, what))
+    assert watched.record() and str(watched)
 
 
 def test_a_sigma_on_its_bound_is_a_limit():

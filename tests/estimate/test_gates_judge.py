@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from asflown.estimate.gates_fit import fit_gates
-from asflown.estimate.gates_judge import judge
+from asflown.estimate.gates_judge import judge_gates
 from asflown.estimate.gates_patch import across_patch
 from asflown.estimate.gates_tests import directions_of, hodges_ajne, inside_band, rayleigh, sign_test
 from asflown.estimate.gates_use import predict
@@ -43,7 +43,7 @@ def signed(below: int, count: int):
 )
 def test_published_counts_and_their_signs(below, count, percent, p):
     """002: underburns and overburns of both engines before and after the biases were taken out."""
-    spread = judge(fit_gates(signed(below, count)), draws=20).spreads[0]
+    spread = judge_gates(fit_gates(signed(below, count)), draws=20).spreads[0]
     assert (spread.below, round(100 * spread.below / spread.count)) == (below, percent)
     assert spread.sign_p == pytest.approx(p, rel=0.06) == sign_test(below, count)
 
@@ -55,14 +55,14 @@ def test_published_later_burns_lie_closer_than_the_model_says():
     assert chance(1e-3, RCS.model.sigma_magnitude(0.1), 20) == pytest.approx(0.081, abs=1e-3)
     assert chance(1e-3, RCS.model.sigma_magnitude(0.0), 20) == pytest.approx(0.394, abs=5e-4)
     quiet = maneuvers(Gates(1.5e-3, 0, 5e-3, 1e-3), np.geomspace(0.5, 10, 14))
-    found = judge(fit_gates(quiet), against=MAIN, draws=20)
+    found = judge_gates(fit_gates(quiet), against=MAIN, draws=20)
     assert found.against.chi2_p < 0.02 and any("smaller than its sigmas" in d for d in found.doubts)
 
 
 @pytest.mark.parametrize("count, expected", [(26, 1.2), (48, 2.2), (49, 2.2), (85, 3.9)])
 def test_published_number_of_false_two_sigma_flags(count, expected):
     m = replace(signed(count // 2, count), pointing_error_mps=None, pointing_covariance=None)
-    assert round(judge(fit_gates(m), draws=20).expected_beyond_2_sigma, 1) == expected
+    assert round(judge_gates(fit_gates(m), draws=20).expected_beyond_2_sigma, 1) == expected
 
 
 def test_published_totals_and_bands():
@@ -101,7 +101,7 @@ def test_law_an_outlier_is_judged_by_the_model_without_it():
     error[7] += 25e-3
     m = replace(m, magnitude_error_mps=error)
     fit = fit_gates(m)
-    found = judge(fit, draws=50)
+    found = judge_gates(fit, draws=50)
     worst = found.outliers[0]
     assert worst.id == m.id[7] and worst.component == "magnitude" and worst.discovered
     rest = fit_gates(m.without([m.id[7]], "test"))
@@ -117,7 +117,7 @@ def test_law_an_outlier_is_judged_by_the_model_without_it():
 
 def test_recovery_outliers_are_rarely_false():
     """The false-discovery rule flags in 5 % of clean sets or fewer; two sigma flags in nearly all."""
-    found = [judge(fit_gates(execute(MAIN.model, MAIN_ENGINE_SET, [8, n])), draws=10).outliers for n in range(60)]
+    found = [judge_gates(fit_gates(execute(MAIN.model, MAIN_ENGINE_SET, [8, n])), draws=10).outliers for n in range(60)]
     assert np.mean([any(o.discovered for o in f) for f in found]) < 0.15
     assert np.mean([len(f) for f in found]) == pytest.approx(4.4, abs=1.0)
 
@@ -129,28 +129,28 @@ def test_recovery_one_well_determined_small_burn_decides_a_small_set():
     error, sigma = m.magnitude_error_mps.copy(), m.sigma_magnitude_mps.copy()
     error[0], sigma[0] = 1.5e-3, 0.02e-3
     sigma[1:3] = 1e-3
-    few = judge(fit_gates(replace(m, magnitude_error_mps=error, sigma_magnitude_mps=sigma)), draws=20)
+    few = judge_gates(fit_gates(replace(m, magnitude_error_mps=error, sigma_magnitude_mps=sigma)), draws=20)
     worst = max(few.influence, key=lambda i: i.in_sigmas)
     assert worst.id == m.id[0] and few.sufficient is False
-    many = judge(fit_gates(execute(RCS.model, replace(RCS_SET, count=69), 3)), draws=20)
+    many = judge_gates(fit_gates(execute(RCS.model, replace(RCS_SET, count=69), 3)), draws=20)
     assert many.sufficient is True
 
 
 def test_envelope_and_distribution_of_a_right_model():
-    found = judge(fit_gates(execute(MAIN.model, MAIN_ENGINE_SET, 11)), draws=200)
+    found = judge_gates(fit_gates(execute(MAIN.model, MAIN_ENGINE_SET, 11)), draws=200)
     s = found.spreads[0]
     inside = (s.envelope[0] <= s.quantiles) & (s.quantiles <= s.envelope[1])
     assert inside.mean() > 0.85 and s.shape_p > 0.01
     assert sum(s.record()["pit_counts"]) == 48
     heavy = execute(MAIN.model, MAIN_ENGINE_SET, 11)
     heavy = replace(heavy, magnitude_error_mps=4e-3 * np.random.default_rng(0).standard_t(1.2, 48))
-    assert judge(fit_gates(heavy), draws=200).spreads[0].shape_p < 0.05
+    assert judge_gates(fit_gates(heavy), draws=200).spreads[0].shape_p < 0.05
 
 
 def test_against_its_own_model_nothing_is_outside_too_often():
     outside = 0
     for n in range(30):
-        found = judge(fit_gates(execute(MAIN.model, MAIN_ENGINE_SET, [12, n])), against=MAIN, draws=5).against
+        found = judge_gates(fit_gates(execute(MAIN.model, MAIN_ENGINE_SET, [12, n])), against=MAIN, draws=5).against
         said = [
             x for keys in found.consistent.values() for v in keys.values() for x in (v if isinstance(v, list) else [v])
         ]
@@ -159,7 +159,7 @@ def test_against_its_own_model_nothing_is_outside_too_often():
 
 
 def test_few_burns_are_counted_and_nothing_more():
-    found = judge(fit_gates(execute(MAIN.model, MAIN_ENGINE_SET, 1).take(range(5))))
+    found = judge_gates(fit_gates(execute(MAIN.model, MAIN_ENGINE_SET, 1).take(range(5))))
     assert found.outliers == () and found.influence == () and found.sufficient is None
     assert found.spreads[0].record()["inside_1_sigma"] is None and str(found) and found.record()
 

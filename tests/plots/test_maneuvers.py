@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from asflown.estimate.gates_fit import fit_gates
-from asflown.estimate.gates_judge import judge
-from asflown.estimate.gates_watch import watch
+from asflown.estimate.gates_judge import judge_gates
+from asflown.estimate.gates_watch import watch_maneuvers
 from asflown.maneuvers.history import past_model
 from asflown.plots.figure import new_figure
 from asflown.plots.labels import label_points
@@ -33,7 +33,7 @@ def test_labels_do_not_collide():
 @pytest.mark.parametrize("count", [3, 9, 49])
 def test_every_figure_is_drawn(count, tmp_path):
     fit = fit_gates(execute(RCS, replace(RCS_SET, count=count), 1))
-    figures = gates_figures(fit, judge(fit, draws=30))
+    figures = gates_figures(fit, judge_gates(fit, draws=30))
     assert set(figures) >= {"magnitude", "pointing", "plane", "directions"} and ("distribution" in figures) == fit.known
     for path in save_figures(figures, tmp_path):
         text = path.read_text()
@@ -43,12 +43,12 @@ def test_every_figure_is_drawn(count, tmp_path):
 def test_without_pointing_only_magnitudes_are_drawn(tmp_path):
     m = replace(execute(RCS, RCS_SET, 1), pointing_error_mps=None, pointing_covariance=None)
     fit = fit_gates(m)
-    assert set(gates_figures(fit, judge(fit, draws=30))) == {"magnitude", "distribution"}
+    assert set(gates_figures(fit, judge_gates(fit, draws=30))) == {"magnitude", "distribution"}
 
 
 @pytest.mark.parametrize("weaker", [0.0, 0.1])
 def test_degradation_is_drawn(weaker, tmp_path):
     m = a_branch(past_model("rcs/2008-01").model, weaker, 1)
-    w = watch(m)
+    w = watch_maneuvers(m)
     paths = save_figures({"watch": watch_figure(w), "degradation": degradation_figure(w, m)}, tmp_path)
     assert ("up to OTM-169: alarm" in paths[1].read_text()) == (weaker > 0)

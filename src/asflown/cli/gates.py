@@ -62,7 +62,7 @@ def fit(
 ) -> None:
     """Fixed and proportional sigmas and biases of magnitude and pointing, with intervals, outliers, influence and doubts."""
     from asflown.estimate.gates_fit import fit_gates
-    from asflown.estimate.gates_judge import judge
+    from asflown.estimate.gates_judge import judge_gates
     from asflown.estimate.gates_patch import across_patch
     from asflown.kit.errors import BadInput
     from asflown.kit.files import check_folder
@@ -87,7 +87,7 @@ def fit(
         burns, model=model, likelihood=likelihood, hold=held(hold, whose), prior=None if earlier is None else earlier.model,
         prior_width=prior_width, bootstrap=bootstrap, seed=seed,
     )  # fmt: skip
-    judged = judge(result, against=past_named(against, whose), seed=seed)
+    judged = judge_gates(result, against=past_named(against, whose), seed=seed)
     doubts = [*result.doubts, *judged.doubts, *(compared.doubts if compared else ())]
     options = {
         "engine": engine, "model": model, "likelihood": likelihood, "hold": hold, "prior": prior, "prior_width": prior_width,

@@ -22,13 +22,13 @@ def watch(
     json: bool = JSON,
 ) -> None:
     """Each new burn against the model before it: outliers, cumulated sums, the change point, and what could have been seen.  Exit 3 on alarm."""
-    from asflown.estimate.gates_watch import watch as watched
+    from asflown.estimate.gates_watch import watch_maneuvers
     from asflown.kit.files import check_folder
 
     if plot_dir is not None:
         check_folder(plot_dir)
     burns = maneuvers_from(file, engine, without)
-    result = watched(burns, first=first, against=past_named(against, burns.engine[0]), false_alarm=false_alarm)
+    result = watch_maneuvers(burns, first=first, against=past_named(against, burns.engine[0]), false_alarm=false_alarm)
     options = {"engine": engine, "from": first, "against": against, "false_alarm": false_alarm, "without": without}
     if plot_dir is not None:
         from asflown.plots.maneuvers import degradation_figure, save_figures, watch_figure

@@ -196,7 +196,14 @@ def _doubts(m: Maneuvers, model: str, likelihood: str, parts: list[Part], prior:
     if likelihood == "unweighted":
         yield "unweighted: what the orbit determination was wrong by is counted as execution error"
     if prior is not None:
-        yield f"the sigmas lean on {prior.name or 'an earlier model'} as a prior: intervals hold where it does"
+        zero = [
+            f"{p.name} {t}"
+            for p in parts
+            for t, width in zip(("fixed", "proportional"), p.problem.prior[1::2], strict=True)
+            if width == 0
+        ]
+        free = f"; not {' and '.join(zero)}, which is zero there and tells nothing" if zero else ""
+        yield f"the sigmas lean on {prior.name or 'an earlier model'} as a prior{free}: intervals hold where it does"
 
 
 def _known(what: str, name: str, names) -> None:

@@ -49,12 +49,12 @@ def sigma_interval(problem: Problem, best: Point, which: int) -> Interval:
     low = 0.0
     if estimate > 0 and beyond(0.0) > 0:
         low = optimize.brentq(beyond, 0.0, estimate, xtol=1e-6 * estimate)
-    top = max(estimate, 0.05 * unit)
+    inner, top = estimate, max(1.5 * estimate, 0.05 * unit)
     while beyond(top) < 0:
-        top *= 1.6
+        inner, top = top, 1.6 * top
         if top > _FARTHEST * unit:
             return low, None
-    high = optimize.brentq(beyond, max(top / 1.6, estimate), top, xtol=1e-6 * top) if top > estimate else estimate
+    high = optimize.brentq(beyond, inner, top, xtol=1e-6 * top)
     return float(low), float(high)
 
 

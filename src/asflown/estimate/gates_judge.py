@@ -120,7 +120,7 @@ class Judgement:
             f"  outliers        {', '.join(f'{o.id} ({o.component}, z {o.z:+.1f})' for o in found) or 'none'}; beyond 2 sigma "
             f"{len(self.outliers)}, by chance {self.expected_beyond_2_sigma:.1f}"
         )
-        if self.influence:
+        if any(i.largest for i in self.influence):
             worst = max(self.influence, key=lambda i: i.in_sigmas)
             lines.append(
                 f"  influence       {worst.id} most: without it {worst.largest} moves by {worst.in_sigmas:.2f} of its sigma"
@@ -137,7 +137,7 @@ class Judgement:
         return "\n".join(lines)
 
 
-def judge(fit: GatesFit, *, against: PastModel | None = None, draws: int = 499, seed: int = 0) -> Judgement:
+def judge_gates(fit: GatesFit, *, against: PastModel | None = None, draws: int = 499, seed: int = 0) -> Judgement:
     """Judge a fit by its own burns, and the burns by ``against``, a model of the history.
 
     ``draws``: sets simulated from the fit and fitted anew, for the envelopes and the test of the distribution.
@@ -153,7 +153,7 @@ def judge(fit: GatesFit, *, against: PastModel | None = None, draws: int = 499, 
     directions = directions_of(m.across[0]) if m.pointing_error_mps is not None else None
     compared = None if against is None else _against(fit, against)
     worst = max(influence, key=lambda i: i.in_sigmas, default=None)
-    sufficient = None if worst is None else worst.in_sigmas <= _MOVED
+    sufficient = None if worst is None or not worst.largest else worst.in_sigmas <= _MOVED
     expected = 2 * float(stats.norm.sf(_SIGMAS)) * len(m) * len(fit.parts) if outliers or influence else 0.0
     return Judgement(spreads, outliers, expected, influence, sufficient, directions, compared,
                      tuple(_doubts(spreads, outliers, worst, compared, against)))  # fmt: skip
@@ -248,9 +248,7 @@ def _against(fit: GatesFit, past: PastModel) -> Against:
             None,
         )
     ]
-    told = [
-        foresee_by(left, float(v), s * s, biased=True) for v, s in zip(m.dv_mps, m.sigma_magnitude_mps, strict=True)
-    ]
+    told = [foresee_by(left, float(v), s * s) for v, s in zip(m.dv_mps, m.sigma_magnitude_mps, strict=True)]
     chi2, freedom = sum(t.distance2(e) for t, e in zip(told, m.magnitude_error_mps, strict=True)), len(m)
     values = {
         "magnitude": [

@@ -6,7 +6,7 @@ Restricted (REML), the likelihood has the biases integrated out, which takes awa
 likelihood underestimates sigmas.  A two-dimensional pointing error becomes two rows, along the axes of its orbit
 determination's ellipse: a + b v^2 is the same in all directions, so that the rows are independent.
 
-Inside, y and v are in units of their own rms.  The kernels take a row a measurement, (M,), and columns of the biases, (M, p).
+Inside, y and v are in units of their own rms (of y with tracking).  The kernels take a row a measurement, (M,), and columns of the biases, (M, p).
 """
 
 from __future__ import annotations
@@ -209,7 +209,8 @@ class Problem:
         """``error_mps`` (N, c) with covariance (N, c, c), c = 1 or 2; ``weight`` (N,): exponents, then without covariance."""
         n, c = error_mps.shape
         values, axes = np.linalg.eigh(covariance)
-        size, speed = float(np.sqrt(np.mean(error_mps**2))) or 1.0, float(np.sqrt(np.mean(dv_mps**2)))
+        size = float(np.sqrt(np.mean(error_mps**2) + np.mean(np.clip(values, 0, None)))) or 1.0
+        speed = float(np.sqrt(np.mean(dv_mps**2)))
         v = np.repeat(dv_mps / speed, c)
         along = axes.transpose(0, 2, 1)  # rows: axes of the ellipse
         y = np.einsum("nai,ni->na", along, error_mps).ravel() / size
@@ -306,7 +307,8 @@ class Problem:
     def refit_all(self, sets: np.ndarray, near: Point) -> np.ndarray:
         """Fits of sets of this problem's rows (B, M), dimensionless: fixed, proportional and biases, (B, 2 + p)."""
         free = [h is None for h in self.held]
-        starts = self._starts(self.held, near)
+        # without the first edge: of 4000 sets of 8 to 49 burns 0.1 % at most then miss a likelihood higher by up to 0.04
+        starts = np.ascontiguousarray(self._starts(self.held, near)[::2])
         found = _refits(sets, starts, *free, self.d, self.v**2, self.X, self.k, self.reml, np.array(self.prior))
         found[:, :2] = np.sqrt(found[:, :2]) * self.units
         found[:, 2:] *= self.bias_units

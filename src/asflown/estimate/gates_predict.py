@@ -78,11 +78,11 @@ def _freedom(problem: Problem, point: Point, g, total: float) -> float:
     return float(np.clip(2 * total**2 / uncertain if uncertain > 0 else most, min(1.0, most), most))
 
 
-def foresee_by(gates: Gates, dv_mps: float, od_covariance, *, biased: bool) -> Foreseen:
-    """What a given model says of a burn: magnitude where ``od_covariance`` is (1, 1), pointing where (2, 2)."""
+def foresee_by(gates: Gates, dv_mps: float, od_covariance) -> Foreseen:
+    """What a given model, its biases included, says of a burn: magnitude where ``od_covariance`` is (1, 1), pointing where (2, 2)."""
     od = np.atleast_2d(od_covariance)
     if len(od) == 1:
         sigma, mean = gates.sigma_magnitude(dv_mps), np.atleast_1d(gates.mean_magnitude(dv_mps))
     else:
         sigma, mean = gates.sigma_pointing(dv_mps), gates.mean_pointing(dv_mps)
-    return Foreseen(mean if biased else np.zeros(len(od)), (float(sigma) ** 2 + 1e-18) * np.eye(len(od)) + od, np.inf)
+    return Foreseen(mean, (float(sigma) ** 2 + 1e-18) * np.eye(len(od)) + od, np.inf)

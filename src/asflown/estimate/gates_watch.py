@@ -128,12 +128,12 @@ class Watch:
         return "\n".join(line.rstrip() for line in lines)
 
 
-def watch(
+def watch_maneuvers(
     m: Maneuvers, *, first: str | None = None, against: PastModel | None = None, false_alarm: float = 0.05
 ) -> Watch:
     """Watch the burns from ``first`` on (after the fifteenth, or all where ``against`` gives a model to judge by).
 
-    ``against``: magnitudes read about the biases it left, pointing about zero.  ``false_alarm``: share of watches as long that raise a false alarm.
+    ``against``: read about the biases it left.  ``false_alarm``: share of watches as long that raise a false alarm.
     Raises BadInput where too few burns come before the first one watched."""
     if not 0 < false_alarm < 1:
         raise BadInput(
@@ -188,8 +188,8 @@ def _foretold(m: Maneuvers, rows, k: int, against: PastModel | None):
     od, across_od = m.sigma_magnitude_mps[k] ** 2, None if m.pointing_covariance is None else m.pointing_covariance[k]
     v = float(m.dv_mps[k])
     if against is not None:
-        across = None if across_od is None else foresee_by(against.left, v, across_od, biased=False)
-        return foresee_by(against.left, v, od, biased=True), across, (0.0, ""), against.left
+        across = None if across_od is None else foresee_by(against.left, v, across_od)
+        return foresee_by(against.left, v, od), across, (0.0, ""), against.left
     prior = problems(m.take(rows))
     points = {name: p.minimum() for name, p in prior.items()}
     told = foresee(prior["magnitude"], points["magnitude"], v, od)
