@@ -108,7 +108,7 @@ def test_against_patch_figures_and_page(rcs, tmp_path):
     assert len(list((tmp_path / "figures").glob("*.svg"))) == 5
     page = (tmp_path / "page.html").read_text()
     assert (
-        page.count("<svg") == 5
+        page.count("<svg") == 7
         and 'href="http' not in page
         and json.loads((tmp_path / "page.json").read_text())["count"] == 49
     )

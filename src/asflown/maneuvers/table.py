@@ -15,6 +15,7 @@ from ..kit.files import sha256_of
 from .adjust import SCALE, Adjustment, Ledger, entered, scale_corrected
 from .columns import Columns, read_table
 from .frame import SMALLEST, resolved, tvc_axes
+from .history import engine_called
 
 #: Parts of the expected dV, each rounded to 0.1 mm/s, add up to it within this. [m/s]
 _ROUNDED = 2e-4
@@ -84,20 +85,28 @@ class Maneuvers:
         return replace(self, **cut)
 
     def of(self, engine: str | None) -> Maneuvers:
-        """Those of one engine.  Raises BadInput where the file holds several and none is named, or not this one."""
+        """Those of one engine, as the file calls it or by another common name ('MEA' for 'main engine').
+
+        Raises BadInput where the file holds several and none is named, or not this one."""
+        held = some_of(e or "one without a name" for e in self.engines)
         if engine is None:
             if len(self.engines) > 1:
                 raise BadInput(
-                    f"the file holds several engines: {some_of(e or 'one without a name' for e in self.engines)}",
-                    file=self.source or None, remedy="Name one with --engine.",
-                )  # fmt: skip
+                    f"the file holds several engines: {held}",
+                    file=self.source or None,
+                    remedy="Name one with --engine.",
+                )
             return self
-        if engine not in self.engines:
+        kind = engine_called(engine)
+        alike = [e for e in self.engines if e == engine] or [
+            e for e in self.engines if kind is not None and engine_called(e) == kind
+        ]
+        if len(alike) != 1:
             raise BadInput(
-                f"the file holds no maneuver of engine {engine!r}",
-                file=self.source or None, remedy=f"It holds: {some_of(e or 'one without a name' for e in self.engines)}.",
+                f"the file holds no maneuver of engine {engine!r}" if not alike else f"{engine!r} may be {some_of(alike)}",
+                file=self.source or None, remedy=f"It holds: {held}.",
             )  # fmt: skip
-        return self.take([e == engine for e in self.engine])
+        return self.take([e == alike[0] for e in self.engine])
 
     def without(self, ids, reason: str) -> Maneuvers:
         """All but some, the reason kept.  Raises BadInput for an id that is not there, or where none is left."""
