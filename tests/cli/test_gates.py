@@ -72,7 +72,7 @@ def test_bad_options_are_complained_of(words, rcs):
 
 
 def test_five_rows_answer_with_doubts_and_no_numbers(tmp_path):
-    """Pairs of dV wanted and had, as press notes give them: magnitudes only, no tracking sigma known."""
+    """Pairs of dV wanted and had, as press notes give them (numbers made up): magnitudes only, no tracking sigma known."""
     path = tmp_path / "five.csv"
     path.write_text(
         "id,dv [m/s],magnitude_error [mm/s],sigma_magnitude [mm/s]\n"

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy import optimize, stats
 
 from asflown.estimate.gates_fit import FEWEST, fit_gates, problems
@@ -17,6 +19,7 @@ from asflown.kit.errors import BadInput
 from asflown.kit.plain import plain
 from asflown.maneuvers.history import past_model
 from asflown.maneuvers.model import Gates
+from asflown.maneuvers.table import Maneuvers
 from asflown.sim.maneuver_sets import MAIN_ENGINE_SET, RCS_SET, execute
 from maneuvers.sample import maneuvers
 
@@ -267,3 +270,28 @@ def test_recovery_unweighted_counts_tracking_errors_as_execution_errors():
     weighted = np.median([fit_gates(m).pointing.point.proportional for m in sets])
     unweighted = np.median([fit_gates(m, likelihood="unweighted").pointing.point.proportional for m in sets])
     assert unweighted > weighted * 1.1
+
+
+ANY = st.tuples(
+    st.floats(1e-6, 1e6), st.floats(-1e6, 1e6), st.floats(0, 1e6), st.floats(-1e6, 1e6), st.floats(-1e6, 1e6)
+)
+
+
+@settings(deadline=None, max_examples=60)
+@given(rows=st.lists(ANY, min_size=1, max_size=18), model=st.sampled_from(["estimated-bias", "zero-mean"]))
+def test_whatever_the_numbers_the_answer_is_finite_or_null(rows, model):
+    dv, error, sigma, x, y = np.array(rows).T
+    n = len(rows)
+    m = Maneuvers(
+        tuple(map(str, range(n))),
+        ("rcs",) * n,
+        dv,
+        error,
+        sigma,
+        np.stack([x, y], 1),
+        sigma[:, None, None] ** 2 * np.eye(2),
+    )
+    fit = fit_gates(m, model=model, bootstrap=2)
+    json.dumps(plain(fit.record() | judge_gates(fit, draws=3).record()), allow_nan=False)
+    if n > 15:
+        json.dumps(plain(watch_maneuvers(m).record()), allow_nan=False)

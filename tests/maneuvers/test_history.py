@@ -91,6 +91,7 @@ def test_published_doubts_of_the_tables_are_kept():
 def test_a_model_is_found_by_engine_or_by_its_whole_name():
     assert past_model("2012-1", "MEA").engine == MAIN_ENGINE
     assert past_model("rcs/2012-1", "main").engine == RCS
+    assert past_model("2007-02", "rcs").model.name == "rcs/2007-02"
     for name, engine in (("2012-1", None), ("2012-1", "ion"), ("1999", "rcs"), ("ion/2012-1", "rcs")):
         with pytest.raises(BadInput, match="Name one of"):
             past_model(name, engine)

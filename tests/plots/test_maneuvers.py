@@ -52,3 +52,13 @@ def test_degradation_is_drawn(weaker, tmp_path):
     w = watch_maneuvers(m)
     paths = save_figures({"watch": watch_figure(w), "degradation": degradation_figure(w, m)}, tmp_path)
     assert ("up to OTM-169: alarm" in paths[1].read_text()) == (weaker > 0)
+
+
+@pytest.mark.parametrize("count", [1, 2, 12])
+def test_burns_of_one_size_without_errors_are_drawn(count, tmp_path):
+    m = execute(RCS, replace(RCS_SET, count=count), 1)
+    m = replace(
+        m, dv_mps=np.full(count, 0.1), magnitude_error_mps=np.zeros(count), pointing_error_mps=np.zeros((count, 2))
+    )
+    fit = fit_gates(replace(m, pointing_covariance=np.zeros((count, 2, 2)), sigma_magnitude_mps=np.zeros(count)))
+    assert save_figures(gates_figures(fit, judge_gates(fit, draws=20)), tmp_path)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -70,7 +70,8 @@ def past_model(name: str, engine: str | None = None) -> PastModel:
     kind = engine_called(whose or engine or "")
     found = [m for m in history() if short in m.names and (kind is None or m.engine == kind)]
     if len({m.engine for m in found}) == 1 and (kind is not None or not whose):
-        return found[0]
+        called = f"{found[0].engine}/{short}"
+        return replace(found[0], model=replace(found[0].model, name=called), left=replace(found[0].left, name=called))
     known = [f"{m.engine}/{n}" for m in history() for n in m.names if kind in (None, m.engine)]
     what = "is a model of both engines" if found and not whose else "is not a model of the history"
     raise BadInput(f"{name!r} {what}", remedy=f"Name one of: {some_of(known, 24)}.")

@@ -19,8 +19,8 @@ def label_points(ax, x, y, texts, avoid) -> None:
 
     if not len(texts):
         return
-    ax.margins(0.08, 0.12)
-    ax.autoscale_view()
+    ax.margins(y=0.12)
+    ax.autoscale_view(scalex=False)
     ax.figure.draw_without_rendering()  # settles the layout
     scale = ax.figure.dpi / 72
     font, renderer = FontProperties(size=_SIZE), ax.figure.canvas.get_renderer()

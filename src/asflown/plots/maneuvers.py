@@ -49,6 +49,7 @@ def _draw_errors(ax, m, error, od, marked) -> None:
                 m.dv_mps[rows], 1e3 * error[rows], 1e3 * od[rows], fmt="o", color=color, ms=size, lw=0.8, alpha=0.85
             )
     ax.set_xscale("log")
+    ax.set_xlim(0.75 * m.dv_mps.min(), 1.33 * m.dv_mps.max())  # burns of one size leave nothing to scale by
 
 
 def _draw_model(ax, v, mean, sigma, color=GREEN, name="model") -> None:
@@ -142,8 +143,13 @@ def draw_plane(m, ax, figure, marked=()):
         ax.plot(x, y, ".", color=color(m.dv_mps[k]), ms=4)
     ax.axhline(0, color=GREY, linewidth=0.8)
     ax.axvline(0, color=GREY, linewidth=0.8)
-    ax.set_aspect("equal", adjustable="datalim")
-    ax.autoscale_view()
+    ax.set_aspect("equal", adjustable="box")
+    reach = 1e3 * m.sigma_pointing_mps[:, None]
+    corners = np.vstack([1e3 * m.across[0] - reach, 1e3 * m.across[0] + reach, np.zeros((1, 2))])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    half = 0.55 * max(float(np.max(high - low)), 1e-6)
+    (x0, y0) = (low + high) / 2
+    ax.set(xlim=(x0 - half, x0 + half), ylim=(y0 - half, y0 + half))
     ax.set_xlabel("TVC X [mm/s]")
     ax.set_ylabel("TVC Y [mm/s]")
     _size_bar(figure, ax, bar)
