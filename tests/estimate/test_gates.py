@@ -237,7 +237,9 @@ def test_bad_choices_are_refused(main_set):
 def test_recovery_bootstrap_says_what_many_sets_say():
     fits = [fit_gates(execute(MAIN, MAIN_ENGINE_SET, [9, n])).magnitude.point for n in range(150)]
     spread = np.std([f.fixed for f in fits]), np.std([f.beta[0] for f in fits])
-    drawn = fit_gates(execute(MAIN, MAIN_ENGINE_SET, [9, 0]), bootstrap=1000).magnitude.drawn
+    fit = fit_gates(execute(MAIN, MAIN_ENGINE_SET, [9, 0]), bootstrap=1000)
+    assert str(fit).count("bootstrap") == 10 and fit.record()["magnitude"]["bootstrap"]["refits"] == 1000
+    drawn = fit.magnitude.drawn
     assert np.std(drawn[:, 0]) == pytest.approx(spread[0], rel=0.3)
     assert np.std(drawn[:, 2]) == pytest.approx(spread[1], rel=0.3)
 

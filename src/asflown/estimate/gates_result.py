@@ -192,20 +192,25 @@ class GatesFit:
             lines.append(f"  {part.name}" + (" (per axis)" if part.name == "pointing" else ""))
             values = [part.point.fixed, part.point.proportional, *part.point.beta]
             intervals = [*part.sigmas, *part.biases]
-            for name, value, interval in zip(part.terms, values, intervals, strict=True):
+            drawn = (
+                [None] * len(values)
+                if part.drawn is None
+                else np.quantile(part.drawn, [0.025, 0.975], axis=0).T.tolist()
+            )
+            for name, value, interval, refitted in zip(part.terms, values, intervals, drawn, strict=True):
                 scale, unit = _READ["fixed" if name.endswith("fixed") else part.name]
+                within = _between(interval, scale, unit)
                 if name in part.held:
                     said, within = f"{scale * value:.3g} {unit}", "held"
                 elif not part.known:
-                    said, within = "not known", _between(interval, scale, unit)
+                    said = "not known"
                 elif name in part.at_bound:
-                    high = interval[1]
-                    said, within = (
-                        f"< {scale * high:.3g} {unit}" if high is not None else "no limit",
-                        "95 %; on its bound",
-                    )
+                    said = "no limit" if interval[1] is None else f"< {scale * interval[1]:.3g} {unit}"
+                    within = "95 %; on its bound"
                 else:
-                    said, within = f"{_digits(scale * value)} {unit}", _between(interval, scale, unit)
+                    said = f"{scale * value:.3g} {unit}"
+                if refitted is not None:
+                    within += f"; bootstrap {scale * refitted[0]:.3g} to {scale * refitted[1]:.3g}"
                 lines.append(f"    {name:22s} {said:>14s}   {within}".rstrip())
         return "\n".join(lines)
 
@@ -222,10 +227,6 @@ def _between(interval: Interval, scale: float, unit: str) -> str:
         return ""
     ends = ["-inf" if low is None else f"{scale * low:.3g}", "no limit" if high is None else f"{scale * high:.3g}"]
     return f"95 %: {ends[0]} to {ends[1]} {unit}"
-
-
-def _digits(value: float) -> str:
-    return f"{value:.3g}"
 
 
 def _size(dv_mps: float) -> str:
