@@ -35,6 +35,15 @@ _PUBLIC = {
     "load_mission": "asflown.sim.mission",
     "fly_mission": "asflown.sim.fly_mission",
     "error_budget": "asflown.campaigns.budget",
+    "Gates": "asflown.maneuvers.model",
+    "Maneuvers": "asflown.maneuvers.table",
+    "load_maneuvers": "asflown.maneuvers.table",
+    "write_maneuvers": "asflown.maneuvers.write",
+    "past_model": "asflown.maneuvers.history",
+    "fit_gates": "asflown.estimate.gates_fit",
+    "GatesFit": "asflown.estimate.gates_result",
+    "judge_gates": "asflown.estimate.gates_judge",
+    "watch_maneuvers": "asflown.estimate.gates_watch",
 }
 
 __all__ = [*_PUBLIC, "__version__"]
@@ -57,6 +66,10 @@ if TYPE_CHECKING:
     from asflown.estimate.compare import compare_torques
     from asflown.estimate.external_result import ExternalTorque
     from asflown.estimate.external_torque import external_torque
+    from asflown.estimate.gates_fit import fit_gates
+    from asflown.estimate.gates_judge import judge_gates
+    from asflown.estimate.gates_result import GatesFit
+    from asflown.estimate.gates_watch import watch_maneuvers
     from asflown.estimate.inertia import inertia_tensor
     from asflown.estimate.inertia_result import InertiaResult
     from asflown.estimate.result import TorqueResult
@@ -64,6 +77,10 @@ if TYPE_CHECKING:
     from asflown.estimate.wheel_drag import wheel_drag
     from asflown.estimate.wheel_result import WheelsResult
     from asflown.kit.errors import BadInput
+    from asflown.maneuvers.history import past_model
+    from asflown.maneuvers.model import Gates
+    from asflown.maneuvers.table import Maneuvers, load_maneuvers
+    from asflown.maneuvers.write import write_maneuvers
     from asflown.sim.fly import fly, write_flight
     from asflown.sim.fly_mission import fly_mission
     from asflown.sim.mission import Mission, load_mission

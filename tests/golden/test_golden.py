@@ -6,6 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from asflown.maneuvers.history import past_model
+from asflown.maneuvers.write import maneuver_text
+from asflown.sim.maneuver_sets import RCS_SET, execute
 from cli.program import csv_text, flight, run
 
 HERE = Path(__file__).parent
@@ -17,6 +20,9 @@ TEXTS = {
     "telemetry-check": ["telemetry", "check", "t.csv"],
     "craft-show-cassini": ["craft", "show", "cassini", "--at", "2005-02-09"],
     "craft-list": ["craft", "list"],
+    "gates": ["gates", "m.csv"],
+    "gates-watch": ["gates", "watch", "m.csv", "--from", "rcs-40"],
+    "gates-history": ["gates", "history"],
     "help": ["--help"],
 }  # fmt: skip
 
@@ -26,6 +32,7 @@ def test_golden_text(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
     Path("t.csv").write_text(csv_text(flight()))
+    Path("m.csv").write_text(maneuver_text(execute(past_model("rcs/2012-1").model, RCS_SET, 1)))
     done = run(*TEXTS[name])
     assert done.code == 0 and done.err == ""
     golden = HERE / f"{name}.txt"

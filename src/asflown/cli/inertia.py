@@ -5,24 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import typer
-from typer.core import TyperGroup
 
 from . import inertia_history, inertia_plan
+from .groups import FitUnlessNamed
 from .options import CHANNELS, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP, craft_from, hashes, telemetry_from
 from .output import print_doubts, print_json, progress, provenance, say
 
-
-class _FileOrPlan(TyperGroup):
-    """A file may stand where a subcommand is expected: it is estimated from."""
-
-    def parse_args(self, ctx, args):
-        if args and args[0] not in self.commands and args[0] not in ("--help", "-h"):
-            args = ["estimate", *args]
-        return super().parse_args(ctx, args)
-
-
 app = typer.Typer(
-    cls=_FileOrPlan,
+    cls=FitUnlessNamed,
     help="The inertia tensor and the external torque from slews: `asflown inertia FILE` (its options: asflown inertia FILE --help).",
     no_args_is_help=True,
     rich_markup_mode=None,
@@ -31,8 +21,8 @@ app.command("history", short_help="Tensors estimated and predicted over the miss
 app.command("plan", short_help="Which slew would tell most of what is not known yet.")(inertia_plan.plan)
 
 
-@app.command("estimate", short_help="What `asflown inertia FILE` does: the tensor from a file.")
-def estimate(
+@app.command("fit", short_help="What `asflown inertia FILE` does: the tensor from a file.")
+def fit(
     file: Path = typer.Argument(help="Telemetry: CSV (plain or gzip), Parquet, NetCDF or HDF5."),
     craft: str = CRAFT,
     method: str = typer.Option(

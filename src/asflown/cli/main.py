@@ -15,6 +15,7 @@ from . import (
     craft,
     demo,
     external_torque,
+    gates,
     inertia,
     report,
     simulate,
@@ -38,6 +39,7 @@ app.command("demo", short_help="Fly the papers' cases and reconstruct them.")(de
 app.command("report", short_help="One page for the anomaly board.")(report.report)
 app.add_typer(inertia.app, name="inertia", short_help="The inertia tensor and the external torque, from slews.")
 app.add_typer(trend.app, name="trend", short_help="An actuator's health over years: add, list, show, compare, watch.")
+app.add_typer(gates.app, name="gates", short_help="Maneuver execution errors: fit, judge, watch, predict.")
 app.add_typer(telemetry.app, name="telemetry", short_help="Check a telemetry file; list channel names.")
 app.add_typer(craft.app, name="craft", short_help="List, show and check crafts.")
 

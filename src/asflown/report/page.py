@@ -1,15 +1,10 @@
 """The report: one HTML file that opens offline, light and dark, on paper and on a phone, and its JSON twin.
 
-Reads a verdict, draws with plots, fills a template.  Pictures are SVG inside the page; their ink and greys are the
-page's own colours, so that they follow it into the dark."""
+Reads a verdict, draws with plots, fills a template.  Pictures are SVG inside the page (see ``pictures``)."""
 
 from __future__ import annotations
 
-import io
 import json
-import re
-from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -17,23 +12,14 @@ import numpy as np
 from ..kit.files import write_text
 from ..kit.plain import plain
 from ..plots import trend as draw
-from ..plots.figure import BLUE, GREY, save_svg
 from ..trends.analyse import BASES
 from ..trends.entry import MOVES
 from ..trends.record import health_record, sudden_words
 from ..trends.verdicts import FigureHealth, Health
+from .pictures import Picture, svg_of, template
 
 #: Figures whose years are drawn first, whatever is found (000 Figs 17, 18).
 _FIRST = ("angular_impulse", "peak_positive", "peak_negative")
-#: Ink in which the pictures are drawn, to be replaced by the page's.
-_INK, _GRID = "#010203", "#e4e4e4"
-
-
-@dataclass(frozen=True)
-class Picture:
-    title: str
-    words: str
-    svg: str
 
 
 def write_report(healths: list[Health], out: Path, provenance: dict) -> tuple[Path, dict]:
@@ -48,7 +34,7 @@ def write_report(healths: list[Health], out: Path, provenance: dict) -> tuple[Pa
         "kinds": [health_record(h) for h in healths],
         "doubts": list(dict.fromkeys(d for h in healths for d in h.doubts)), "provenance": provenance,
     }  # fmt: skip
-    page = _template().render(
+    page = template("report.html", quantity=_quantity, number=_number, interval=_interval).render(
         healths=healths, main=healths[0], sections=[(h, _pictures(h)) for h in healths],
         provenance=provenance, version=__version__,
     )  # fmt: skip
@@ -64,7 +50,7 @@ def _pictures(h: Health) -> list[Picture]:
     pictures: list[Picture] = []
 
     def add(name: str, title: str, words: str, figure) -> None:
-        pictures.append(Picture(title, words, _svg(figure, f"{h.kind}-{name}")))
+        pictures.append(Picture(title, words, svg_of(figure, f"{h.kind}-{name}")))
 
     for name in _FIRST:
         found = [f for f in h.figures if f.figure == name and len(f.rows) > 1]
@@ -110,53 +96,6 @@ def _trend_words(f: FigureHealth) -> str:
         said += f"; a change of {t.detectable_percent:.0f} % would have been seen in 8 of 10 such histories"
     sudden = sudden_words(f)
     return said + "." + ("" if sudden is None else f" {sudden[0].upper()}{sudden[1:]}.")
-
-
-def _svg(figure, name: str) -> str:
-    """The figure as SVG to stand inside a page: no declaration, ids of its own, the page's colours."""
-    for ax in figure.axes:
-        ax.set_title("", loc="left")  # the page has its own above
-        _ink(ax)
-    buffer = io.StringIO()
-    save_svg(figure, buffer, salt=name)
-    text = buffer.getvalue()
-    text = text[text.index("<svg") :]
-    text = re.sub(r' (?:width|height)="[\d.]+pt"', "", text, count=2)
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.S)
-    text = re.sub(r'\bid="([^"]+)"', rf'id="{name}-\1"', text)
-    text = re.sub(r'(url\(#|href="#)', rf"\1{name}-", text)
-    for k, grey in enumerate(draw.GREYS):
-        text = text.replace(grey, f"var(--g{k})")
-    for old, new in (
-        (_INK, "currentColor"),
-        ("#000000", "currentColor"),
-        (_GRID, "var(--grid)"),
-        (GREY, "var(--mid)"),
-        (BLUE, "var(--blue)"),
-    ):
-        text = text.replace(old, new).replace(old.lower(), new)
-    return text
-
-
-def _ink(ax) -> None:
-    ax.set_facecolor("none")
-    ax.figure.patch.set_visible(False)
-    ax.tick_params(colors=_INK)
-    for spine in ax.spines.values():
-        spine.set_color(_INK)
-    legend = ax.get_legend()
-    for words in (ax.title, ax._left_title, ax.xaxis.label, ax.yaxis.label, *(legend.get_texts() if legend else ())):
-        words.set_color(_INK)
-    ax.xaxis.get_offset_text().set_color(_INK)
-
-
-def _template():
-    from jinja2 import Environment, StrictUndefined
-
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"quantity": _quantity, "number": _number, "interval": _interval}
-    source = resources.files("asflown.report") / "templates" / "report.html"
-    return environment.from_string(source.read_text(encoding="utf-8"))
 
 
 def _number(value, digits: int = 3) -> str:

@@ -256,7 +256,7 @@ def _checked(table: Table) -> Table:
     if twice:
         raise BadInput(f"the header names a column twice: {some_of(twice)}", remedy="Keep one of them, or rename one.")
     if len(table) == 0:
-        raise BadInput("the table has a header and no rows", remedy="Give at least one row of telemetry.")
+        raise BadInput("the table has a header and no rows", remedy="Give at least one row.")
     return table
 
 
