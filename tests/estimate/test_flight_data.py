@@ -135,7 +135,7 @@ def test_iss_torque_about_x_follows_the_gravity_gradient():
 
     telemetry, craft = iss().between(4360, 10010), load_craft("iss")  # one orbit
     result = disturbance_torque(telemetry, craft, method="momentum", window_s=300.0)
-    at, gravity = study.gravity_gradient(telemetry, craft.at(telemetry.epoch_ns).inertia_kgm2)
+    at, gravity = study.pull_of_gravity(telemetry, craft.at(telemetry.epoch_ns).inertia_kgm2)
     known = np.isfinite(result.torque_Nm[:, 0])
     expected = np.interp(result.time_s[known], at, gravity[:, 0])
     assert np.corrcoef(result.torque_Nm[known, 0], expected)[0, 1] > 0.8
@@ -148,7 +148,7 @@ def test_recovery_iss_fused_torque_about_x_follows_the_gravity_gradient():
 
     telemetry, craft = iss().between(4728, 7128), load_craft("iss")
     result = disturbance_torque(telemetry, craft, method="fused", prior="matern")
-    at, gravity = study.gravity_gradient(telemetry, craft.at(telemetry.epoch_ns).inertia_kgm2)
+    at, gravity = study.pull_of_gravity(telemetry, craft.at(telemetry.epoch_ns).inertia_kgm2)
     expected = np.interp(result.time_s, at, gravity[:, 0])
     assert np.corrcoef(result.torque_Nm[:, 0], expected)[0, 1] > 0.8
     assert abs(np.mean(result.torque_Nm[:, 0] - expected)) < 1.5  # N m, of 3

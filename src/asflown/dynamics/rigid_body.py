@@ -39,28 +39,25 @@ def second_moments(I_B: np.ndarray) -> np.ndarray:
 
 
 def tensor_from_cholesky(x: np.ndarray) -> np.ndarray:
-    """A tensor a body can have, from any six numbers: Sigma = L L^T with L lower, log of its diagonal in x. (3, 3)
+    """A tensor a body can have, from any six numbers: Sigma = L L^T with L lower. (3, 3)
 
-    x (6,): row by row of the lower triangle, L00 L10 L11 L20 L21 L22."""
+    x (6,): row by row of the lower triangle, L00 L10 L11 L20 L21 L22.  A zero on the diagonal is a flat or a thin body,
+    the edge of what is possible, which is why the diagonal is not a logarithm."""
     L = np.zeros((3, 3))
     L[_LOWER] = x
-    L[np.diag_indices(3)] = np.exp(np.diag(L))
     sigma = L @ L.T
     return np.trace(sigma) * np.eye(3) - sigma
 
 
 def cholesky_of(I_B: np.ndarray) -> np.ndarray:
     """The six numbers of ``tensor_from_cholesky``.  Raises LinAlgError for a tensor no body can have."""
-    L = np.linalg.cholesky(second_moments(I_B))
-    L[np.diag_indices(3)] = np.log(np.diag(L))
-    return L[_LOWER]
+    return np.linalg.cholesky(second_moments(I_B))[_LOWER]
 
 
 def nearest_possible(elements: np.ndarray, information: np.ndarray) -> tuple[np.ndarray, bool]:
     """Of all tensors a body can have, that of least (x - elements)^T information (x - elements). (6,), and whether it moved.
 
-    Six free numbers of ``tensor_from_cholesky`` and least squares: at the edge of what is possible (a rod, a flat
-    plate) they run to a limit, which is reached to 1e-6 of the trace."""
+    Six free numbers of ``tensor_from_cholesky`` and least squares, which has one minimum where the constraint is a cone."""
     from scipy import optimize
 
     I_B = tensor_of(elements)

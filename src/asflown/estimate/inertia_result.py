@@ -130,8 +130,10 @@ class InertiaResult:
                 for a, t, s in zip("xyz", self.torque, self.torque_sigma, strict=True)
             )
             lines.append(f"  torque   {each}  {of}, {self.frame} axes")
-        unit = "rad/s per unit spin inertia" if self.relative else "mN m s"
-        lines.append(f"  residual {self.residual_rms * (1.0 if self.relative else 1e3):.3g} {unit} rms")
+        scale, unit = (1.0, "rad/s per unit spin inertia") if self.relative else (1e3, "mN m s")
+        if not self.relative and self.residual_rms > 1:
+            scale, unit = 1.0, "N m s"
+        lines.append(f"  residual {scale * self.residual_rms:.3g} {unit} rms")
         if self.comparison is not None:
             lines.append(str(self.comparison))
         return "\n".join(lines)

@@ -2,7 +2,8 @@
 
     d/dt (R I w) = R (u + 3 mu / r^5  r x I r + T)        R: body to inertial, u: torque of the actuators on the body
 
-Both sides are integrated once and averaged over blocks, so that no rate is differenced; T is constant in body axes.
+Both sides are integrated once and averaged over blocks, so that no rate is differenced.  T, in body axes, is constant
+plus once and twice an orbit, as the air's density and the Sun make it.
 
 Where the craft only holds its attitude, u answers outside torques and the noise of the rates as much as it moves the
 body, and least squares of one on the other is then wrong in a way its residuals do not show.  What does show it is the
@@ -34,7 +35,7 @@ _FEWEST_ROWS = 20
 
 @dataclass(frozen=True)
 class Balance:
-    """What the momentum balance alone says of six elements and T (9,).
+    """What the momentum balance alone says of six elements and of the constant part of T (9,).
 
     ``covariance`` (9, 9): from the scores' own scatter over half hours, and how much the answer moves with the length of
     the blocks; ``by_block``: elements (6,) for each length."""
@@ -56,8 +57,9 @@ def balance(telemetry: Telemetry) -> Balance:
         telemetry.channel(name)
     tai_ns, values = together(telemetry, names)
     cadence = int(np.median(np.diff(tai_ns))) if len(tai_ns) > 1 else 0
+    angle = _orbit_angle(values[:, 10:13])
     stretches = [
-        _Stretch.of(seconds_since(tai_ns[s], telemetry.epoch_ns), values[s])
+        _Stretch.of(seconds_since(tai_ns[s], telemetry.epoch_ns), values[s], angle[s])
         for s in segments(tai_ns, BRIDGED, cadence)
         if s.stop - s.start > 2
     ]
@@ -87,20 +89,22 @@ class _Stretch:
     time_s: np.ndarray
     R: np.ndarray
     omega_B: np.ndarray
-    columns: np.ndarray  # (n, 3, 9)
+    columns: np.ndarray  # (n, 3, 21): elements, T's constant, and cos, sin of the orbit's angle and of twice it
     pushed: np.ndarray  # (n, 3)
 
     @classmethod
-    def of(cls, t, values) -> _Stretch:
+    def of(cls, t, values, angle) -> _Stretch:
         r = rotation(values[:, :4])
         R, omega, u = r.as_matrix(), values[:, 4:7], values[:, 7:10]
         pull = gravity_gradient_regressor(r.inv().apply(values[:, 10:13]))
-        columns = -_integral(t, R @ np.concatenate([pull, np.broadcast_to(np.eye(3), R.shape)], axis=2))
+        waves = [np.ones_like(angle), *(f(n * angle) for n in (1, 2) for f in (np.cos, np.sin))]
+        steady = [np.eye(3) * w[:, None, None] for w in waves]
+        columns = -_integral(t, R @ np.concatenate([pull, *steady], axis=2))
         columns[:, :, :6] += R @ momentum_regressor(omega)
         return cls(t, R, omega, columns, _integral(t, np.einsum("nij,nj->ni", R, u)))
 
     def rows(self, block_s: float):
-        """(time, X (3, 9), y (3,), rate) of each pair of neighbouring blocks, axes of the body between them."""
+        """(time, X (3, 21), y (3,), rate) of each pair of neighbouring blocks, axes of the body between them."""
         block = np.floor((self.time_s - self.time_s[0]) / block_s).astype(int)
         edges = np.flatnonzero(np.diff(block, prepend=-1, append=block[-1] + 1))
         spans = [slice(a, b) for a, b in pairwise(edges) if b - a > 0.5 * np.median(np.diff(edges))]
@@ -115,9 +119,9 @@ class _Stretch:
 def _least_squares(rows) -> Balance:
     """Each axis weighted by its own scatter; covariance from the scores summed over half hours."""
     time_s, X, y, omega = (np.array(column) for column in zip(*rows, strict=True))
-    scale, size = np.ones(3), np.ones(9)
+    scale, size = np.ones(3), np.ones(X.shape[2])
     for _ in range(4):
-        A, b = (X / scale[:, None]).reshape(-1, 9), (y / scale).ravel()
+        A, b = (X / scale[:, None]).reshape(-1, X.shape[2]), (y / scale).ravel()
         size = np.linalg.norm(A, axis=0)
         size[size == 0] = 1.0
         solution = np.linalg.lstsq(A / size, b, rcond=1e-12)[0] / size
@@ -127,10 +131,18 @@ def _least_squares(rows) -> Balance:
     score = np.einsum("nik,ni->nk", A, residual / scale)
     group = np.floor((time_s - time_s[0]) / _ALIKE_S)
     sums = np.array([score[group == g].sum(axis=0) for g in np.unique(group)])
-    flat = A.reshape(-1, 9)
+    flat = A.reshape(-1, X.shape[2])
     bread = np.linalg.pinv(flat.T @ flat, rcond=1e-14, hermitian=True)
     covariance = bread @ (sums.T @ sums) @ bread / np.outer(size, size)
-    return Balance(solution, covariance, {}, time_s, omega, y, residual)
+    return Balance(solution[:9], covariance[:9, :9], {}, time_s, omega, y, residual)
+
+
+def _orbit_angle(position) -> np.ndarray:
+    """Along the orbit from the first position, in its plane. [rad]"""
+    r = position / np.linalg.norm(position, axis=1, keepdims=True)
+    normal = np.cross(r[:-1], r[1:]).sum(axis=0)
+    across = np.cross(normal / max(np.linalg.norm(normal), 1e-300), r[0])
+    return np.arctan2(r @ across, r @ r[0])
 
 
 def _integral(t, values) -> np.ndarray:

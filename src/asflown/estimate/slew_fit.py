@@ -35,6 +35,8 @@ _STRIDE = 1.6
 _LOOSEST = 1e10
 #: What is assumed of time stamps and of the rates' bias: hardly anything. [s], [rad/s]
 _SKEW_S, _BIAS = 10.0, 1e-3
+#: The bias where no attitude shows it: then it turns the inertial axes themselves. [rad/s]
+_BIAS_ALONE = 1e-5
 #: A reading this many sigmas from what all others say of it is left out, and let in again below the second.
 _OUT, _IN = 6.0, 4.0
 #: In wheels' cadences, where single kicks tell all: a fit may slip from one reading of a kick to the next.
@@ -61,6 +63,7 @@ class SlewFit:
     layout: Layout
     frame: str
     beta: np.ndarray
+    moved: np.ndarray  # by how much in the last round
     covariance: np.ndarray
     information: np.ndarray  # of beta, from the data alone (p, p)
     by_scale: np.ndarray  # beta per unit error of the wheels' spin inertia, and of the rates' scale
@@ -81,7 +84,7 @@ class SlewFit:
         z = self.model
         departure = self.smoothed.mean
         step = np.repeat(np.arange(len(z.start) - 1), np.diff(z.start))
-        return z.y - np.sum(z.H * departure[step], axis=1)
+        return z.y - z.Z[:, : self.layout.size] @ self.moved - np.sum(z.H * departure[step], axis=1)
 
     @property
     def whitened(self) -> np.ndarray:
@@ -137,7 +140,7 @@ def fit_slews(record: SlewRecord, *, frame: str = "body", prior: tuple[np.ndarra
         motion, beta = motion.moved(s.mean), beta + delta
     information = f.information[1 : layout.size + 1, 1 : layout.size + 1]
     return SlewFit(
-        record, layout, frame, beta + delta, covariance, information, by_scale, fitted, motion, model, s, f, kept, loosened,
+        record, layout, frame, beta + delta, delta, covariance, information, by_scale, fitted, motion, model, s, f, kept, loosened,
         rounds, converged, log_likelihood,
     )  # fmt: skip
 
@@ -148,7 +151,7 @@ def _priors(layout: Layout, prior, skew_s: float):
         if k is not None:
             weight[k, k] = 1 / skew_s**2
     if layout.bias is not None:
-        weight[layout.bias, layout.bias] = np.eye(3) / _BIAS**2
+        weight[layout.bias, layout.bias] = np.eye(3) / (_BIAS if layout.skew_rates is not None else _BIAS_ALONE) ** 2
     if prior is not None:
         centre[layout.TENSOR], weight[layout.TENSOR, layout.TENSOR] = prior
     return weight, centre

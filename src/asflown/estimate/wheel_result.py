@@ -219,6 +219,8 @@ def plus_minus(value: float, sigma: float) -> str:
     if not (np.isfinite(sigma) and sigma > 0):
         return f"{value:.4g}"
     digits = 1 - int(np.floor(np.log10(sigma)))
+    if digits < 0 and abs(value) < 1e6:
+        return f"{value:.0f} +- {sigma:.0f}"
     if not -1 < digits <= 7:
         return f"{value:.4g} +- {sigma:.2g}"
     return f"{value:.{digits}f} +- {sigma:.{digits}f}"

@@ -19,7 +19,7 @@ def draw_rates(result: InertiaResult, ax):
     for s in result.slews:
         ax.axvspan(s.start_s, s.stop_s, color=GREY, alpha=0.12, linewidth=0)
         ax.text(0.5 * (s.start_s + s.stop_s), top, s.about, ha="center", va="bottom", fontsize=8, color=GREY)
-    ax.legend(frameon=False, fontsize=8, loc="upper right", ncol=3)
+    ax.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1, 1.0), ncol=3)
     return ax
 
 
@@ -33,12 +33,11 @@ def draw_momentum(result: InertiaResult, ax):
 def draw_residual(result: InertiaResult, ax):
     """Momentum that the fit leaves over: noise around zero where it explains the data.  Returns ax."""
     e = result.evidence
-    scale = 1.0 if result.relative else 1e3
+    scale, unit = (1.0, "rad/s") if result.relative else (1e3, "mN m s") if result.residual_rms < 1 else (1.0, "N m s")
     for k, colour in enumerate(BY_AXIS):
         ax.plot(e.time_s[e.used], scale * e.residual_Nms[e.used, k], ".", ms=2, color=colour, label=AXES[k])
     ax.axhline(0, color=GREY, linewidth=0.8)
-    ax.set_ylabel("left over\n[rad/s]" if result.relative else "left over\n[mN m s]")
-    unit = "rad/s" if result.relative else "mN m s"
+    ax.set_ylabel(f"left over\n[{unit}]")
     ax.set_title(f"rms {scale * result.residual_rms:.3g} {unit}", loc="right", fontsize=8, color=GREY)
     return ax
 
