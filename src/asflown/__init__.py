@@ -21,6 +21,9 @@ _PUBLIC = {
     "compare_torques": "asflown.estimate.compare",
     "external_torque": "asflown.estimate.external_torque",
     "ExternalTorque": "asflown.estimate.external_result",
+    "leak": "asflown.estimate.leak",
+    "LeakWatch": "asflown.estimate.leak",
+    "LeakResult": "asflown.estimate.leak_result",
     "wheel_drag": "asflown.estimate.wheel_drag",
     "WheelsResult": "asflown.estimate.wheel_result",
     "Scenario": "asflown.sim.scenario",
@@ -55,6 +58,8 @@ if TYPE_CHECKING:
     from asflown.estimate.compare import compare_torques
     from asflown.estimate.external_result import ExternalTorque
     from asflown.estimate.external_torque import external_torque
+    from asflown.estimate.leak import LeakWatch, leak
+    from asflown.estimate.leak_result import LeakResult
     from asflown.estimate.result import TorqueResult
     from asflown.estimate.torque import disturbance_torque
     from asflown.estimate.wheel_drag import wheel_drag

@@ -10,7 +10,7 @@ import sys
 
 import typer
 
-from . import budget, craft, demo, external_torque, report, simulate, telemetry, torque, trend, tune, wheels
+from . import budget, craft, demo, external_torque, leak, report, simulate, telemetry, torque, trend, tune, wheels
 
 app = typer.Typer(help=__doc__, add_completion=False, rich_markup_mode=None)
 app.command("torque", short_help="Reconstruct the disturbance torque.")(torque.torque)
@@ -18,6 +18,7 @@ app.command("wheels", short_help="Bearing drag of the wheels, and how they were 
 app.command("external-torque", short_help="The steady external torque, from momentum gained.")(
     external_torque.external_torque
 )
+app.command("leak", short_help="Leaking and weak thrusters, from residual momentum.")(leak.leak)
 app.command("simulate", short_help="Fly a scenario in the closed loop.")(simulate.simulate)
 app.command("budget", short_help="How wrong each method is, over many flights.")(budget.budget)
 app.command("tune", short_help="The papers' search for a smoothing span.")(tune.tune)
