@@ -30,6 +30,7 @@ def quiet_steps(count: int, step_s: float) -> Steps:
         in_wheels=np.tile(5.0 * np.eye(3), (count, 1, 1)),
         ordered=none,
         pulses=none,
+        guessed=none,
         unsure=np.zeros((count, 3, 3)),
         lost=np.zeros(count, bool),
         doubts=(),

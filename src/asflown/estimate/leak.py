@@ -38,6 +38,7 @@ _FAR_FROM_KNOWN = 200 * 86_400 * NS  # a thrust from longer ago is doubted
 _SURE = 0.95  # posterior below which the thruster named is doubted
 _MISFIT = 7.0  # log likelihood ratio of any direction over the best column; noise exceeds it once in 1100
 _FEW_DEGREES = 120
+_FOLLOWING = 3.0  # readings worth one, beyond which a doubt says so
 
 
 def leak(telemetry: Telemetry, craft: Craft, **options) -> LeakResult:
@@ -286,6 +287,11 @@ class LeakWatch:
         if noise.degrees < _FEW_DEGREES:
             doubts.append(
                 f"the noise is learned from readings worth {noise.degrees / AXES_IN_A_LEAK:.0f} independent ones: a larger leak is needed for an alarm"
+            )
+        if noise.alike.max() > _FOLLOWING:
+            doubts.append(
+                f"readings in the holds the noise is learned from follow each other ({noise.alike.max():.0f} are worth one): if something "
+                "moved then, the noise is overstated and small leaks stay hidden"
             )
         fires = (view.steps.ordered > 0).any()
         known = [h.date for h in self.craft.thrust_history]

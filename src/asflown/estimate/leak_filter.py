@@ -109,6 +109,7 @@ class Monitor:
         self.statistic: list[float] = []
         self.alarm: int | None = None
         self.best: Evidence | None = None
+        self._highest = 0.0  # since the alarm
         self.at_alarm: Evidence | None = None
         at = np.cumsum([0, 3, 3, j, j, 3, 6, wheels])
         self._momentum, self._torque, self._thrust, self._pulse, self._middle, self._inertia, self._spin = (
@@ -160,7 +161,7 @@ class Monitor:
         N[:, self._thrust] = N[:, self._pulse] = pushed
         # a centre of mass further by e takes e x force off: force x e, as a matrix
         N[:, self._middle] = R @ _crossing(self.geometry.directions @ J)
-        self._renew_pulses(steps.pulses[i])
+        self._renew_pulses(steps.pulses[i], steps.guessed[i])
         self.x[:3] += N @ self.x
         self.P[:3] += N @ self.P
         self.P[:, :3] += self.P @ N.T
@@ -175,7 +176,7 @@ class Monitor:
         self._E[:, :3] += N @ self._E
         self._E[:, :3] += np.concatenate([dt * R, -pushed], axis=1)
 
-    def _renew_pulses(self, begun) -> None:
+    def _renew_pulses(self, begun, guessed) -> None:
         """Pulses begun have a thrust of their own, in the mean of them; one that goes on keeps it."""
         if not (begun > 0).any():
             return
@@ -184,7 +185,7 @@ class Monitor:
         self.x *= kept
         self.P *= np.outer(kept, kept)
         self._E *= kept[:, None]
-        fresh = np.where(begun > 0, self.known.pulse_share**2 / np.maximum(begun, 1.0), 0.0)
+        fresh = np.where(begun > 0, self.known.pulse_share**2 / np.maximum(begun, 1.0) + guessed, 0.0)
         self.P[self._pulse, self._pulse] += np.diag(fresh)
 
     def gains(self, steps: Steps, i: int):
@@ -196,7 +197,8 @@ class Monitor:
         C[:, self._inertia] = R @ _moments(steps.body_rate[i])
         C[:, self._spin] = R @ steps.in_wheels[i]
         S = C @ self.P @ C.T + R @ (np.diag(self.variance) + steps.unsure[i]) @ R.T
-        return C, S, np.linalg.solve(S, C @ self.P).T, np.linalg.solve(S, C @ self._E)
+        inverse = np.linalg.inv(S)
+        return C, S, self.P @ C.T @ inverse, inverse @ (C @ self._E)
 
     def measure(self, steps: Steps, i: int) -> None:
         """Take an instant's momentum into the estimate and into the evidence of every change."""
@@ -223,14 +225,14 @@ class Monitor:
             self.statistic.append(0.0)
             return
         now = self.evidence(i)
-        self.statistic.append(now.statistic)
-        if self.alarm is None and now.statistic > self.threshold:
+        height = now.statistic
+        if self.alarm is None and height > self.threshold:
             self.alarm, self.at_alarm = i, now
-        if self.alarm is not None:
-            if self.best is None or now.statistic > self.best.statistic:
-                self.best = now
-            return
-        self.thin(i)
+        self.statistic.append(height)
+        if self.alarm is None:
+            self.thin(i)
+        elif height > self._highest:
+            self.best, self._highest = now, height
 
     def thin(self, i: int) -> None:
         """Forget beginnings grown old: those that divide by 2^k are kept 2^k times as long."""

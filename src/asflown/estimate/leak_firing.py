@@ -82,6 +82,7 @@ class Firing:
     impulse: np.ndarray
     pulses: np.ndarray
     breaks: np.ndarray
+    counted: np.ndarray  # (j,), by a pulse counter; else their number is a guess
     doubts: tuple[str, ...] = ()
 
     def at(self, tai_ns, geometry: Geometry, thrust_N: float):
@@ -130,7 +131,7 @@ def firing_of(tlm: Telemetry, geometry: Geometry, thrust_N: float) -> Firing:
     nothing = np.zeros((0, j))
     if not timed:
         doubt = "no on-times are in the telemetry: thrusters are taken not to fire"
-        return Firing(none, nothing, nothing, nothing, np.zeros(0), (doubt,))
+        return Firing(none, nothing, nothing, nothing, np.zeros(0), np.ones(j, bool), (doubt,))
     doubts = []
     if len(timed) < j:
         missing = [n for n in geometry.names if n not in timed]
@@ -152,8 +153,9 @@ def firing_of(tlm: Telemetry, geometry: Geometry, thrust_N: float) -> Firing:
     interval = np.diff(tai_ns)[:, None] / NS
     # pulses where they are not counted: runs of cycles on, cycles being on by chance as often as the on-time says
     pulses = np.maximum(used / geometry.shortest_s * (1 - used / interval), 0.0)
+    in_count = np.isin(geometry.names, counted)
     if counted:
-        pulses[:, [geometry.names.index(n) for n in counted]] = np.diff(values[:, len(timed) :], axis=0)
+        pulses[:, in_count] = np.diff(values[:, len(timed) :], axis=0)
     broken = (
         (used < 0).any(axis=1) | (used > 1.05 * interval + geometry.shortest_s).any(axis=1) | (pulses < 0).any(axis=1)
     )
@@ -170,4 +172,6 @@ def firing_of(tlm: Telemetry, geometry: Geometry, thrust_N: float) -> Firing:
     def so_far(steps):
         return np.concatenate([np.zeros((1, *steps.shape[1:])), np.cumsum(steps, axis=0)])
 
-    return Firing(tai_ns, so_far(used), so_far(impulse), so_far(pulses), so_far(broken.astype(float)), tuple(doubts))
+    return Firing(
+        tai_ns, so_far(used), so_far(impulse), so_far(pulses), so_far(broken.astype(float)), in_count, tuple(doubts)
+    )

@@ -8,6 +8,7 @@ It grows with every leak, and with pulses that give more or less than ordered.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -25,6 +26,7 @@ _PIECE, _SHORTEST, _ENOUGH, _FEWEST = 40, 8, 150, 12
 #: A leak shows about two axes, each with a noise of its own to know: its size is known by the readings of both.
 AXES_IN_A_LEAK = 2
 _TOO_LARGE = 2.5  # times the median piece's variance: noise alone gives it to one piece in a million
+GUESS_SHARE = 0.5  # one sigma of a number of pulses that nobody counted
 _SLEWING = 1e-4  # body rates that spread by more in a piece are not those of a hold [rad/s]
 _SMALLEST_NOISE = 1e-5  # N m s; below it noise-free data would make the filter believe rounding
 
@@ -40,6 +42,7 @@ class Steps:
     in_wheels: np.ndarray  # (N, 3, n), each wheel's momentum, body axes
     ordered: np.ndarray  # (N, j), impulse that pulses ordered since the last instant should have given [N s]
     pulses: np.ndarray  # (N, j), how many those were
+    guessed: np.ndarray  # (N, j), relative variance of ``ordered`` where pulses are not counted
     unsure: np.ndarray  # (N, 3, 3), variance of y that firing adds, body axes
     lost: np.ndarray  # (N,), what was ordered since the last instant is not known
     doubts: tuple[str, ...]
@@ -52,7 +55,7 @@ class Steps:
         rows = {f.name: getattr(self, f.name)[: max(count, 0)] for f in fields(self) if f.name != "doubts"}
         return replace(self, **rows)
 
-    @property
+    @cached_property
     def quiet(self) -> np.ndarray:
         """Nothing fired since the last instant, nor is owed."""
         return ~self.lost & (self.ordered == 0).all(axis=1) & (self.unsure == 0).all(axis=(1, 2))
@@ -72,7 +75,7 @@ def steps_of(subject: Subject, geometry: Geometry, thrust_N: float) -> Steps:
     fired = firing_of(subject.telemetry, geometry, thrust_N)
     turned = s.attitude[0].inv() * s.attitude if s.attitude is not None else _turned_by_rates(s)
     kept, given, pulses, unsure, lost = fired.at(s.tai_ns, geometry, thrust_N)
-    step = np.diff(given, axis=0, prepend=given[:1])
+    step, begun = (np.diff(v, axis=0, prepend=v[:1]) for v in (given, pulses))
     middle = _halfway(turned[kept])
     taken = np.cumsum(np.einsum("nij,nj->ni", middle, step @ geometry.columns.T), axis=0)
     axes = np.array([w.axis for w in subject.craft.wheels])
@@ -84,11 +87,18 @@ def steps_of(subject: Subject, geometry: Geometry, thrust_N: float) -> Steps:
         body_rate=np.zeros_like(s.stored[kept]) if s.rates is None else s.rates[kept],
         in_wheels=share[:, None, :] * axes.T,
         ordered=step,
-        pulses=np.diff(pulses, axis=0, prepend=pulses[:1]),
+        pulses=begun,
+        guessed=_guessed(begun * ~fired.counted, step, geometry, thrust_N),
         unsure=unsure,
         lost=np.diff(lost, prepend=lost[:1]) > 0,
         doubts=(*s.doubts, *fired.doubts),
     )
+
+
+def _guessed(begun, ordered, geometry: Geometry, thrust_N: float) -> np.ndarray:
+    """Relative variance of impulses whose pulses are not counted."""
+    impulse = GUESS_SHARE * thrust_N * begun * np.abs(geometry.fall_s - geometry.rise_s)
+    return np.divide(impulse, ordered, out=np.zeros_like(ordered), where=ordered > 0) ** 2
 
 
 def _turned_by_rates(s: Samples) -> Rotation:
