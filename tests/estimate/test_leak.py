@@ -278,6 +278,8 @@ def test_refused_without_centre_of_mass_thrusters_or_time(leak_of_z3):
         leak(tlm, load_craft("iss", cm=(0, 0, 0)))
     with pytest.raises(BadInput, match="too few quiet"):
         leak(cut(tlm, 40), CASSINI)
+    with pytest.raises(BadInput, match="no monitor"):
+        leak(tlm, CASSINI, false_alarms_per_hour=1e4)
     for bad in ({"method": "guess"}, {"window_s": 0}, {"false_alarms_per_hour": -1}, {"thrust_N": float("nan")}):
         with pytest.raises(BadInput):
             LeakWatch(CASSINI, **bad)

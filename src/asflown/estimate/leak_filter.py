@@ -19,6 +19,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import log_ndtr
 
+from ..kit.errors import BadInput
 from .leak_firing import Geometry
 from .leak_samples import AXES_IN_A_LEAK, Noise, Steps
 
@@ -43,10 +44,16 @@ class Known:
 
 #: Law of false alarms, ln(rate an instant) = OFFSET + POWER ln h - h for a threshold h: studies/leak_threshold.py.
 OFFSET, POWER = 0.0, 0.5
+_MOST_OFTEN = 0.05  # an instant; the law has been seen to hold below it
 
 
 def threshold_for(rate_per_instant: float) -> float:
-    """Log likelihood ratio that noise alone exceeds so often."""
+    """Log likelihood ratio that noise alone exceeds so often.  Raises BadInput where that is at every few instants."""
+    if rate_per_instant > _MOST_OFTEN:
+        raise BadInput(
+            f"{rate_per_instant:g} false alarms an instant are no monitor",
+            remedy="Give a lower --false-alarms: it counts alarms an hour.",
+        )
     wanted = np.log(rate_per_instant)
     return float(brentq(lambda h: OFFSET + POWER * np.log(h) - h - wanted, 1.0, 200.0))
 
