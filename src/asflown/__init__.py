@@ -21,6 +21,9 @@ _PUBLIC = {
     "compare_torques": "asflown.estimate.compare",
     "external_torque": "asflown.estimate.external_torque",
     "ExternalTorque": "asflown.estimate.external_result",
+    "leak": "asflown.estimate.leak",
+    "LeakWatch": "asflown.estimate.leak",
+    "LeakResult": "asflown.estimate.leak_result",
     "wheel_drag": "asflown.estimate.wheel_drag",
     "WheelsResult": "asflown.estimate.wheel_result",
     "inertia_tensor": "asflown.estimate.inertia",
@@ -72,6 +75,8 @@ if TYPE_CHECKING:
     from asflown.estimate.gates_watch import watch_maneuvers
     from asflown.estimate.inertia import inertia_tensor
     from asflown.estimate.inertia_result import InertiaResult
+    from asflown.estimate.leak import LeakWatch, leak
+    from asflown.estimate.leak_result import LeakResult
     from asflown.estimate.result import TorqueResult
     from asflown.estimate.torque import disturbance_torque
     from asflown.estimate.wheel_drag import wheel_drag

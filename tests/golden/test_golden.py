@@ -17,6 +17,7 @@ TEXTS = {
     "torque": ["torque", "t.csv", "--axis", "y", "--prior", "matern"],
     "torque-momentum": ["torque", "t.csv", "--axis", "y", "--method", "momentum"],
     "torque-printed": ["torque", "t.csv", "--axis", "y", "--variant", "printed"],
+    "leak": ["leak", "t.csv", "--cm", "0,0,1.35", "--stop", "180"],
     "telemetry-check": ["telemetry", "check", "t.csv"],
     "craft-show-cassini": ["craft", "show", "cassini", "--at", "2005-02-09"],
     "craft-list": ["craft", "list"],

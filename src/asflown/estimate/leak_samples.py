@@ -1,0 +1,175 @@
+"""Residual momentum: what craft and wheels gained beyond what ordered pulses gave, and how well that is known.
+
+    y = R (I w + h_w) - int R sum_j a_j J_j                  in the axes the body had at the first instant (001 section IV)
+
+It grows with every leak, and with pulses that give more or less than ordered.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ..kit.errors import BadInput
+from ..kit.regression import memory
+from ..kit.rotations import turned_by
+from ..kit.timeline import NS, runs
+from .external_samples import Samples, samples_of
+from .leak_firing import Geometry, firing_of
+from .subject import Subject
+
+#: Noise is learned from quiet pieces of so many instants, from the first ones of which so many count together.
+_PIECE, _SHORTEST, _ENOUGH, _FEWEST = 40, 8, 150, 12
+#: A leak shows about two axes, each with a noise of its own to know: its size is known by the readings of both.
+AXES_IN_A_LEAK = 2
+_TOO_LARGE = 2.5  # times the median piece's variance: noise alone gives it to one piece in a million
+GUESS_SHARE = 0.5  # one sigma of a number of pulses that nobody counted
+_SLEWING = 1e-4  # body rates that spread by more in a piece are not those of a hold [rad/s]
+_SMALLEST_NOISE = 1e-5  # N m s; below it noise-free data would make the filter believe rounding
+
+
+@dataclass(frozen=True)
+class Steps:
+    """What a monitor takes, an instant a row (N)."""
+
+    tai_ns: np.ndarray
+    residual: np.ndarray  # (N, 3), y [N m s]
+    turned: np.ndarray  # (N, 3, 3), body to the axes of y
+    body_rate: np.ndarray  # (N, 3)
+    in_wheels: np.ndarray  # (N, 3, n), each wheel's momentum, body axes
+    ordered: np.ndarray  # (N, j), impulse that pulses ordered since the last instant should have given [N s]
+    pulses: np.ndarray  # (N, j), how many those were
+    guessed: np.ndarray  # (N, j), relative variance of ``ordered`` where pulses are not counted
+    unsure: np.ndarray  # (N, 3, 3), variance of y that firing adds, body axes
+    lost: np.ndarray  # (N,), what was ordered since the last instant is not known
+    doubts: tuple[str, ...]
+
+    @property
+    def seconds(self) -> np.ndarray:
+        return (self.tai_ns - self.tai_ns[0]) / NS
+
+    def first(self, count: int) -> Steps:
+        rows = {f.name: getattr(self, f.name)[: max(count, 0)] for f in fields(self) if f.name != "doubts"}
+        return replace(self, **rows)
+
+    @cached_property
+    def quiet(self) -> np.ndarray:
+        """Nothing fired since the last instant, nor is owed."""
+        return ~self.lost & (self.ordered == 0).all(axis=1) & (self.unsure == 0).all(axis=(1, 2))
+
+
+def steps_of(subject: Subject, geometry: Geometry, thrust_N: float) -> Steps:
+    """Residual momentum of a whole record.
+
+    Raises BadInput where inertia, spin inertia or channels are missing, or a channel names a thruster the craft has not."""
+    subject.known_inertia()
+    if subject.relative:
+        raise BadInput(
+            "the wheels' spin inertia is not known, so momentum is not in N m s",
+            remedy="Give the craft's file the wheels' spin_inertia.",
+        )
+    s = samples_of(subject)
+    fired = firing_of(subject.telemetry, geometry, thrust_N)
+    turned = s.attitude[0].inv() * s.attitude if s.attitude is not None else _turned_by_rates(s)
+    kept, given, pulses, unsure, lost = fired.at(s.tai_ns, geometry, thrust_N)
+    step, begun = (np.diff(v, axis=0, prepend=v[:1]) for v in (given, pulses))
+    middle = _halfway(turned[kept])
+    taken = np.cumsum(np.einsum("nij,nj->ni", middle, step @ geometry.columns.T), axis=0)
+    axes = np.array([w.axis for w in subject.craft.wheels])
+    share = s.stored[kept] @ np.linalg.pinv(axes)  # exact for three wheels; of four, the nearest split
+    return Steps(
+        tai_ns=s.tai_ns[kept],
+        residual=turned[kept].apply(s.momentum[kept]) - taken,
+        turned=turned[kept].as_matrix(),
+        body_rate=np.zeros_like(s.stored[kept]) if s.rates is None else s.rates[kept],
+        in_wheels=share[:, None, :] * axes.T,
+        ordered=step,
+        pulses=begun,
+        guessed=_guessed(begun * ~fired.counted, step, geometry, thrust_N),
+        unsure=unsure,
+        lost=np.diff(lost, prepend=lost[:1]) > 0,
+        doubts=(*s.doubts, *fired.doubts),
+    )
+
+
+def _guessed(begun, ordered, geometry: Geometry, thrust_N: float) -> np.ndarray:
+    """Relative variance of impulses whose pulses are not counted."""
+    impulse = GUESS_SHARE * thrust_N * begun * np.abs(geometry.fall_s - geometry.rise_s)
+    return np.divide(impulse, ordered, out=np.zeros_like(ordered), where=ordered > 0) ** 2
+
+
+def _turned_by_rates(s: Samples) -> Rotation:
+    return Rotation.identity(len(s.tai_ns)) if s.rates is None else turned_by(s.seconds, s.rates)
+
+
+def _halfway(turned: Rotation) -> np.ndarray:
+    """Mean of each instant's axes and the last one's, (N, 3, 3)."""
+    m = turned.as_matrix()
+    return 0.5 * (m + np.concatenate([m[:1], m[:-1]]))
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Of one instant's momentum about each body axis, in the long run: variance (3,) [(N m s)^2], and what it is worth."""
+
+    variance: np.ndarray
+    alike: np.ndarray  # (3,), how many successive readings are worth one: part of the variance
+    degrees: float  # of freedom
+    until: int  # instants of the record it was learned from
+
+    @property
+    def sigma(self) -> np.ndarray:
+        return np.sqrt(self.variance)
+
+
+def learned_noise(steps: Steps, final: bool) -> Noise | None:
+    """From the first quiet holds: what is left over straight lines through pieces of them.
+
+    A leak is a straight line too, and hardly shows; a piece in which one begins is left out for its size.  None while
+    there are too few instants and more may come.  Raises BadInput where there will be no more."""
+    pieces: list[tuple[int, np.ndarray]] = []
+    for s in runs(steps.quiet):
+        for start in range(s.start, s.stop, _PIECE):
+            part = slice(start, min(start + _PIECE, s.stop))
+            unfinished = part.stop == len(steps.tai_ns) and part.stop - start < _PIECE and not final
+            slewing = np.ptp(steps.body_rate[part], axis=0).max() > _SLEWING
+            if part.stop - start < _SHORTEST or unfinished or slewing:
+                continue
+            pieces.append((part.stop, _over_a_line(steps, part)))
+            like = _alike_in_size(pieces)
+            if sum(len(p) - 2 for _, p in like) >= _ENOUGH:
+                return _noise_of(like)
+    if not final:
+        return None
+    like = _alike_in_size(pieces) if pieces else []
+    if sum(len(p) - 2 for _, p in like) < _FEWEST:
+        raise BadInput(
+            "there are too few quiet instants to learn the noise from",
+            remedy=f"At least {_FEWEST} in holds without firing are needed, {_ENOUGH} are better: take a longer record.",
+        )
+    return _noise_of(like)
+
+
+def _over_a_line(steps: Steps, part: slice) -> np.ndarray:
+    """Momentum less a straight line through it, body axes, (n, 3)."""
+    t = steps.seconds[part] - steps.seconds[part].mean()
+    line = np.polynomial.polynomial.polyfit(t, steps.residual[part], 1)
+    over = steps.residual[part] - np.polynomial.polynomial.polyval(t, line).T
+    return np.einsum("nji,nj->ni", steps.turned[part], over)
+
+
+def _alike_in_size(pieces):
+    """Those whose variance is at most _TOO_LARGE times the median piece's, about every axis."""
+    variance = np.array([np.sum(p**2, axis=0) / (len(p) - 2) for _, p in pieces])
+    middle = np.sort(variance, axis=0)[(len(pieces) - 1) // 2]
+    return [p for p, v in zip(pieces, variance, strict=True) if (v <= _TOO_LARGE * middle).all()]
+
+
+def _noise_of(pieces) -> Noise:
+    over, count = np.concatenate([p for _, p in pieces]), sum(len(p) - 2 for _, p in pieces)
+    alike = np.array([memory(over[:, k]) for k in range(3)])
+    variance = np.maximum(np.sum(over**2, axis=0) / count * alike, _SMALLEST_NOISE**2)
+    return Noise(variance, alike, AXES_IN_A_LEAK * count / float(alike.max()), pieces[-1][0])
