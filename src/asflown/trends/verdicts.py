@@ -149,7 +149,7 @@ def judge(
         for k, f in enumerate(figures)
     ]
     shape_p = fresh.get(SHAPE)
-    pairs = find_pairs(entries, kind)
+    pairs = find_pairs(entries, kind) if kind in MOVES else []  # a wheel or a tensor does not rest
     same = [
         e for k in family
         if (t := figures[k].trend) is not None and (e := equivalence(figures[k].figure, pairs, t, margin)) is not None
