@@ -35,7 +35,7 @@ CONDITIONS = {
     "half noise": {"noise": "half"},
     "double noise": {"noise": "double"},
     "booms": {"flexible": True},
-    "slosh": {"slosh": True},
+    "slosh": {"slosh": True, "craft_mass": "3170 kg"},
     "1 % lost": {"telemetry": {"dropout": 0.01}},
     "random phases": {"telemetry": {"random_phases": True}},
     "gap in a slew": {"telemetry": {"gaps": [{"start": "150 s", "stop": "210 s"}]}},
@@ -97,7 +97,7 @@ def report(name, found) -> None:
     print(row("scatter [kg m2]", error.std(axis=0, ddof=1), 3))
     print(row("stated sigma [kg m2]", sigma.mean(axis=0), 3))
     print(row("95 % interval holds", np.mean(np.abs(pull) < 1.96, axis=0)))
-    print(row("external torque: pulls, mean, width", [*torque.mean(axis=0), *torque.std(axis=0, ddof=1)]))
+    print(row("external torque: pulls, mean, width", [*torque.mean(axis=0), *torque.std(axis=0, ddof=1)]), flush=True)
     more = [f for f in found if "bound" in f]
     if more:
         print(f" of {len(more)} of them")

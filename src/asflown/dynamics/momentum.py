@@ -40,3 +40,15 @@ def stored_momentum(time_s, control_torque_B, omega_B, h0_B) -> np.ndarray:
     for k in range(len(dt)):
         h[k + 1] = turn[k] @ h[k] + push[k]
     return h
+
+
+def grown_by(time_s, R, frame: str) -> np.ndarray:
+    """What a unit torque about each axis, constant in ``frame`` ('body' or 'inertial'), adds to the momentum since the
+    first instant, inertial axes. (N, 3, 3) [s]
+
+    R (N, 3, 3): body to inertial."""
+    from scipy.integrate import cumulative_trapezoid
+
+    if frame == "inertial":
+        return np.eye(3) * (np.asarray(time_s) - time_s[0])[:, None, None]
+    return cumulative_trapezoid(R, time_s, axis=0, initial=0)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..dynamics.momentum import grown_by
 from ..dynamics.rigid_body import elements_of, momentum_regressor, tensor_of
 from ..kit.errors import BadInput
 from ..kit.rotations import rotation
@@ -150,10 +151,7 @@ def generalized(rows: Rows, levels: Levels, unit_kgm2: np.ndarray, frame: str, f
     t, w = rows.time_s, rows.motion.omega_B
     R = rotation(rows.motion.q_NB).as_matrix()
     arcs, index = np.unique(rows.arc, return_inverse=True)
-    grown = np.eye(3) * (t - t[0])[:, None, None]
-    if frame == "body":
-        grown = np.zeros_like(R)
-        grown[1:] = np.cumsum(0.5 * (R[1:] + R[:-1]) * np.diff(t)[:, None, None], axis=0)
+    grown = grown_by(t, R, frame)
     p = 6 + 3 * len(arcs)
     X = np.zeros((len(t), 3, p + 3))
     X[:, :, :6] = -momentum_regressor(w)

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from ..dynamics.environment import gravity_gradient_regressor
 from ..dynamics.rigid_body import ELEMENTS, momentum_regressor
@@ -99,9 +100,9 @@ class _Stretch:
         pull = gravity_gradient_regressor(r.inv().apply(values[:, 10:13]))
         waves = [np.ones_like(angle), *(f(n * angle) for n in (1, 2) for f in (np.cos, np.sin))]
         steady = [np.eye(3) * w[:, None, None] for w in waves]
-        columns = -_integral(t, R @ np.concatenate([pull, *steady], axis=2))
+        columns = -cumulative_trapezoid(R @ np.concatenate([pull, *steady], axis=2), t, axis=0, initial=0)
         columns[:, :, :6] += R @ momentum_regressor(omega)
-        return cls(t, R, omega, columns, _integral(t, np.einsum("nij,nj->ni", R, u)))
+        return cls(t, R, omega, columns, cumulative_trapezoid(np.einsum("nij,nj->ni", R, u), t, axis=0, initial=0))
 
     def rows(self, block_s: float):
         """(time, X (3, 21), y (3,), rate) of each pair of neighbouring blocks, axes of the body between them."""
@@ -143,14 +144,6 @@ def _orbit_angle(position) -> np.ndarray:
     normal = np.cross(r[:-1], r[1:]).sum(axis=0)
     across = np.cross(normal / max(np.linalg.norm(normal), 1e-300), r[0])
     return np.arctan2(r @ across, r @ r[0])
-
-
-def _integral(t, values) -> np.ndarray:
-    """Cumulative, trapezoidal, from zero."""
-    out = np.zeros_like(values)
-    step = np.diff(t).reshape(-1, *([1] * (values.ndim - 1)))
-    out[1:] = np.cumsum(0.5 * step * (values[1:] + values[:-1]), axis=0)
-    return out
 
 
 def told(found: Balance, sigma: np.ndarray) -> tuple[tuple[str, ...], tuple[str, ...]]:

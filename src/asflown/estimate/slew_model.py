@@ -21,9 +21,10 @@ from math import factorial
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ..dynamics.momentum import grown_by
 from ..dynamics.rigid_body import momentum_regressor, tensor_of
 from ..kit.regressed import Steps
-from ..kit.rotations import quaternion, rotation
+from ..kit.rotations import quaternion, rotation, turned_by
 from .slew_record import SlewRecord
 
 #: Instants closer than this are one. [s]
@@ -121,11 +122,7 @@ def first_motion(record: SlewRecord, time_s: np.ndarray) -> Motion:
             mid = tq[:-1] + np.diff(tq) / 2
             omega = np.stack([np.interp(time_s, mid, step[:, j]) for j in range(3)], axis=1)
     else:
-        turns = Rotation.from_rotvec(0.5 * (omega[1:] + omega[:-1]) * np.diff(time_s)[:, None])
-        r = [Rotation.identity()]
-        for turn in turns:
-            r.append(r[-1] * turn)
-        q = quaternion(Rotation.concatenate(r))
+        q = quaternion(turned_by(time_s, omega))
     return Motion(time_s, q, omega, np.zeros((len(time_s), 3)))
 
 
@@ -297,23 +294,13 @@ def _step_of(motion: Motion, time_s: np.ndarray) -> np.ndarray:
     return np.searchsorted(motion.time_s, time_s - 2 * _SAME_S)
 
 
-def total_momentum(record: SlewRecord, layout: Layout, beta, motion: Motion, R: np.ndarray, frame: str):
-    """What a torque adds up to since the start, inertial axes, per unit torque (N, 3, 3), and its part of H (N, 3)."""
-    t = motion.time_s
-    if frame == "body":
-        grown = np.zeros_like(R)
-        grown[1:] = np.cumsum(0.5 * (R[1:] + R[:-1]) * np.diff(t)[:, None, None], axis=0)
-    else:
-        grown = np.eye(3) * (t - t[0])[:, None, None]
-    return grown, grown @ beta[layout.torque]
-
-
 def _wheel_rows(record, layout, beta, motion, R, frame, n, seen, wander):
     m = record.momentum
     shift = layout.shifts(beta)[0]
     k = _step_of(motion, m.time_s + shift)
     d, I_B = m.direction, tensor_of(beta[layout.TENSOR])
-    grown, added = total_momentum(record, layout, beta, motion, R, frame)
+    grown = grown_by(motion.time_s, R, frame)
+    added = grown @ beta[layout.torque]
     starts = beta[6 : 6 + 3 * layout.arcs].reshape(layout.arcs, 3)
     w, alpha, Rk = motion.omega_B[k], motion.alpha_B[k], R[k]
     L = np.einsum("nji,nj->ni", Rk, starts[m.arc] + added[k])  # of everything, body axes
