@@ -36,6 +36,12 @@ class Valve:
             return D + tf + tr * (np.exp(-D / tr) - np.exp(-td / tr)) - (tf + td) * np.exp(-D / tr)
         return np.where(td > D, 0.0, D + tf - tr + (tr - td - tf) * np.exp(-(np.maximum(D, td) - td) / tr))
 
+    def added(self, variant: str = "corrected") -> float:
+        """What a long pulse gives beyond its on-time, per newton. [s]"""
+        if variant == "printed":
+            return self.fall_s - self.rise_s * float(np.exp(-self.delay_s / self.rise_s))
+        return self.fall_s - self.rise_s
+
     def ratio(self, on_times_s, counts=1.0, variant: str = "corrected") -> float:
         """R of a histogram: impulse over thrust times on-time of ``counts`` pulses of each of ``on_times_s``.
 
@@ -47,16 +53,16 @@ class Valve:
 def expected_effective(on_time_s, pulses, step_s: float, valve: Valve, variant: str = "corrected") -> np.ndarray:
     """Impulse per newton of so many ``pulses`` that were on for ``on_time_s`` together. [s]  Arrays of one shape.
 
-    Pulses are whole multiples of the control step.  How a total is shared out hardly matters: all but the exponential is linear
-    in on-time and count, and that is 0.1 ms of the 170 ms which one step gives.  Taken here: pulses of one step,
-    but for as many of the mean length of the others as the total leaves over."""
+    Pulses are whole multiples of the control step.  How a total is shared out hardly matters: the impulse is linear in on-time
+    and count but for an exponential, 0.1 ms of the 170 ms that one step gives.  Taken here: pulses of one step, but for as
+    many, of one length, as the total has steps over.  Counts need not be whole: a part of a pulse is its share."""
     T, n = np.broadcast_arrays(np.asarray(on_time_s, float), np.asarray(pulses, float))
-    long = np.minimum(
-        np.maximum(T / step_s - n, 0.0), n
-    )  # pulses longer than a step, no more than there are steps over
+    long = np.clip(T / step_s - n, 0.0, n)
     short = n - long
-    length = np.where(long > 0, (T - short * step_s) / np.where(long > 0, long, 1.0), step_s)
-    return short * valve.effective(step_s, variant) + long * valve.effective(length, variant)
+    length = np.where(long > 1e-9, (T - short * step_s) / np.where(long > 1e-9, long, 1.0), step_s)
+    own, linear = valve.effective(step_s, variant), valve.added(variant)
+    late = np.where(length > step_s, valve.effective(np.maximum(length, step_s), variant) - length, own - step_s)
+    return T + n * linear + short * (own - step_s - linear) + long * (late - linear)
 
 
 def moment_matrix(positions, directions, center_of_mass) -> np.ndarray:
