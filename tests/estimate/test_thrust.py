@@ -233,7 +233,9 @@ def test_recovery_on_another_simulators_flight(name):
 
 @pytest.mark.slow
 def test_recovery_pulls_are_unit_normal_with_the_truth_from_the_priors():
-    """200 biasings and burns, each with a fall time, centre of mass, spin inertias and scatter of its own."""
+    """200 biasings and burns, each with a fall time, centre of mass, spin inertias, thrusts and scatter of its own.
+
+    With a burn, against the thrust that flew: a pulse of minutes keeps its scatter throughout (docs/theory/thrust.md)."""
     found = {"alone": [], "both": []}
     for seed in range(200):
         rng = np.random.default_rng(seed)
@@ -248,20 +250,27 @@ def test_recovery_pulls_are_unit_normal_with_the_truth_from_the_priors():
             "fall": f"{1e3 * max(fall, 0.025)} ms",
             "pulse_scatter": float(rng.uniform(0.01, 0.03)),
         }
-        bias, burned = (fly(s, craft=true, seed=seed, thrusters=how) for s in ("wheel-bias-day28", "rcs-burn"))
+        F = 0.7 * (1 + abs(0.05 * rng.standard_normal()) * rng.standard_normal(8))
+        own = [{"thruster": n, "start": "0 s", "factor": f / 0.7} for n, f in zip(NAMES, F, strict=True)]
+        bias, burned = (
+            fly(s, craft=true, seed=seed, thrusters=how, thruster_faults=own) for s in ("wheel-bias-day28", "rcs-burn")
+        )
+        valve = Valve(0.005, 0.020, max(fall, 0.025))
         priors = priors_for(CASSINI, mass_kg=MASS)
-        for key, records in (("alone", [bias.telemetry]), ("both", [bias.telemetry, burned.telemetry])):
-            r = thrust(records, CASSINI, priors=priors)
+        for key, flights in (("alone", [bias]), ("both", [bias, burned])):
+            r = thrust([f.telemetry for f in flights], CASSINI, priors=priors)
+            lengths = [p[1] for f in flights for n in NAMES for p in f.truth.thrusters.pulses_of(n, f.truth.time_s)]
+            flew = sum(f.truth.thrusters.impulse_Ns[-1].sum() for f in flights) / valve.effective(lengths).sum()
             found[key].append([
-                (r.mean_thrust_N - 0.7) / r.mean_sigma_N, (r.fall_time_s - max(fall, 0.025)) / r.fall_time_sigma_s,
+                (r.mean_thrust_N - flew) / r.mean_sigma_N, (r.fall_time_s - max(fall, 0.025)) / r.fall_time_sigma_s,
                 (r.center_m[0] - center[0]) / r.center_sigma_m[0], (r.center_m[1] - center[1]) / r.center_sigma_m[1],
-                r.mean_thrust_N / 0.7 - 1,
+                r.mean_thrust_N / flew - 1,
             ])  # fmt: skip
     alone, both = np.array(found["alone"]), np.array(found["both"])
     assert np.std(alone[:, :4], axis=0) == pytest.approx(1.0, abs=0.2)
     assert abs(alone[:, 4].mean()) < 0.01
     assert np.std(both[:, :4], axis=0) == pytest.approx(1.0, abs=0.3)
-    assert np.std(both[:, 4]) < 0.009
+    assert np.std(both[:, 4]) < 0.008
 
 
 # ---- faults -------------------------------------------------------------------------------------------------

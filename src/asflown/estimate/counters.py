@@ -12,10 +12,14 @@ import numpy as np
 from ..craft.model import Craft, Thruster
 from ..kit.errors import BadInput, some_of
 from ..kit.timeline import NS
-from ..telemetry.telemetry import Telemetry
+from ..telemetry.telemetry import Channel, Telemetry
 from .pulse_counts import Guess, guess_pulses
 from .subject import Subject
 
+#: After a pulse's order, what it gives is not all there for up to so long. [s]
+_TAIL_S = 0.5
+#: Share of the busiest counter's samples at which all must be known.
+_KNOWN = 0.25
 #: Counters that fall by less than this are rounded, not reset. [s]
 _ROUNDING = 1e-6
 
@@ -42,13 +46,15 @@ class Counters:
     """Thrusters' counters at their own instants (M,), from their first sample on; j thrusters.
 
     ``spread``: what one sigma of not knowing the pulses' mean length adds to their number, where they are not counted,
-    ``chance`` the variance of it that is each interval's own."""
+    ``chance`` the variance of it that is each interval's own; ``loose``: variance of the number of pulses given by then, of a
+    counter that is not sampled just then."""
 
     tai_ns: np.ndarray
     on_time_s: np.ndarray  # (M, j)
     pulses: np.ndarray  # (M, j)
     spread: np.ndarray  # (M, j)
     chance: np.ndarray  # (M, j)
+    loose: np.ndarray  # (M, j)
     broken: np.ndarray  # (M - 1,) bool: a counter fell, so that what was fired in the interval is not known
     counted: bool  # pulses are telemetry, not a guess
 
@@ -74,21 +80,26 @@ class Counters:
         x, grid = (np.asarray(v - self.tai_ns[0], float) / NS for v in (tai_ns, self.tai_ns))
         k = np.clip(np.searchsorted(grid, x, side="right") - 1, 0, len(grid) - 2)
         f = ((x - grid[k]) / (grid[k + 1] - grid[k]))[:, None]
-        sums = (self.on_time_s, self.pulses, self.spread, self.chance, self.squares)
-        on, n, s, chance, squares = ((1 - f) * v[k] + f * v[k + 1] for v in sums)
-        per_s = 1 / np.diff(grid)[:, None]
-        ends = np.maximum(k - (f[:, 0] == 0), 0)
-        duty, rate = (np.diff(v, axis=0) * per_s for v in (self.on_time_s, self.pulses))
-        begun = ((f[:, 0] > 0) | (k > 0))[:, None]
+        sums = (self.on_time_s, self.pulses, self.spread, self.chance, self.squares, self.loose)
+        on, n, s, chance, squares, loose = ((1 - f) * v[k] + f * v[k + 1] for v in sums)
+        # counters finer than a tail lasts: the pulses of the last tail are what may not be there yet
+        before = np.minimum(np.where(f[:, 0] > 0, grid[k], grid[np.maximum(k - 1, 0)]), x - _TAIL_S)
+        span = np.maximum(x - before, _TAIL_S)[:, None]
+        until = np.where(f[:, 0] > 0, grid[k + 1], x)
+
+        def lately(v):
+            rises = np.stack([np.interp(until, grid, c) - np.interp(before, grid, c) for c in v.T], axis=1)
+            return rises / (span + (until - x)[:, None])
+
         return Known(
             on,
             n,
             s,
             chance,
             squares,
-            (self.pulses[k + 1] - self.pulses[k]) * f * (1 - f),
-            begun * duty[ends],
-            begun * rate[ends],
+            (self.pulses[k + 1] - self.pulses[k]) * f * (1 - f) + loose,
+            lately(self.on_time_s),
+            lately(self.pulses),
         )
 
 
@@ -116,7 +127,11 @@ def counters_of(subject: Subject) -> tuple[tuple[Thruster, ...], Counters, list[
             remedy="Add the channel; a thruster that is not there has no place in the craft file.",
         )
     doubts: list[str] = []
-    tai_ns, on = _common(tlm, [f"on_time_{n}" for n in names])
+    fires = [n for n in names if np.ptp(tlm.channel(f"on_time_{n}").usable.values) > 0]
+    uncounted = [n for n in fires if f"pulse_count_{n}" not in tlm]
+    both = [f"on_time_{n}" for n in names] + [f"pulse_count_{n}" for n in fires if not uncounted]
+    tai_ns, values, loose = _common(tlm, both)
+    on, loose = values[:, : len(names)], loose[:, : len(names)]
     steps, broken = _risen(np.diff(on, axis=0), "on-time", names, tlm, tai_ns, doubts)
     if not (steps > 0).any():
         raise BadInput(
@@ -124,14 +139,13 @@ def counters_of(subject: Subject) -> tuple[tuple[Thruster, ...], Counters, list[
             file=tlm.source or None,
             remedy="Take a record of a wheel biasing, a run-down under thruster control or a burn.",
         )
-    uncounted = [
-        n for n, fires in zip(names, steps.any(axis=0), strict=True) if fires and f"pulse_count_{n}" not in tlm
-    ]
     step_s = step_of(craft, on)
     guess = guess_pulses(steps, np.diff(tai_ns) / NS, step_s)
     if not uncounted:
-        guess, also = _counted(tlm, names, tai_ns, steps, doubts)
-        broken |= also
+        counts = np.zeros_like(on)
+        counts[:, [names.index(n) for n in fires]] = values[:, len(names) :]
+        pulses, also = _risen(np.diff(counts, axis=0), "pulse count", names, tlm, tai_ns, doubts)
+        guess, broken = Guess(pulses, np.zeros_like(pulses), np.zeros_like(pulses)), broken | also
     else:
         doubts.append(
             f"pulses of {some_of(uncounted)} are not counted: their number is guessed from the on-times "
@@ -141,7 +155,8 @@ def counters_of(subject: Subject) -> tuple[tuple[Thruster, ...], Counters, list[
         np.vstack([np.zeros(len(names)), np.cumsum(v, axis=0)])
         for v in (steps, guess.pulses, guess.spread, guess.chance)
     )
-    return craft.thrusters, Counters(tai_ns, on_time, pulses, spread, chance, broken, not uncounted), doubts
+    counters = Counters(tai_ns, on_time, pulses, spread, chance, loose / step_s, broken, not uncounted)
+    return craft.thrusters, counters, doubts
 
 
 def step_of(craft: Craft, on_time_s) -> float:
@@ -152,21 +167,36 @@ def step_of(craft: Craft, on_time_s) -> float:
     return float(rises[rises > _ROUNDING].min())
 
 
-def _common(tlm: Telemetry, names: list[str]) -> tuple[np.ndarray, np.ndarray]:
-    """Values of channels at the instants of the first, within the span that all cover: a count between two samples is in
-    proportion to time."""
+def _common(tlm: Telemetry, names: list[str]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Instants at which every counter is known, its values there, and how much of its rise may have come before or after, a
+    variance in units of the value, (M, j) each.
+
+    Known is what is sampled, and what is the same before and after.  Where that is so too seldom, the instants of the busiest
+    counter are taken, and the others are in proportion to time."""
     channels = [tlm.channel(n).usable for n in names]
     if min(len(c.tai_ns) for c in channels) < 2:
         raise BadInput("fewer than two usable samples", channel=names[0], remedy="Take a longer record.")
     start, stop = max(c.tai_ns[0] for c in channels), min(c.tai_ns[-1] for c in channels)
-    base = channels[0].tai_ns
-    base = base[(base >= start) & (base <= stop)]
-    if len(base) < 2:
+    busiest = max(channels, key=lambda c: float(np.ptp(c.values)))
+    every = np.unique(np.concatenate([c.tai_ns for c in channels]))
+    every = every[(every >= start) & (every <= stop)]
+    if len(every) < 2:
         raise BadInput(
             "the thrusters' counters have no time in common", channel=names[0], remedy="Take a longer record."
         )
-    values = [np.interp((base - base[0]) / NS, (c.tai_ns - base[0]) / NS, c.values) for c in channels]
-    return base, np.stack(values, axis=1)
+    values, loose = (np.stack(v, axis=1) for v in zip(*(_between(c, every) for c in channels), strict=True))
+    kept = ~loose.any(axis=1)
+    if kept.sum() < _KNOWN * len(busiest.tai_ns):
+        kept = np.isin(every, busiest.tai_ns)
+    return every[kept], values[kept], loose[kept]
+
+
+def _between(c: Channel, tai_ns) -> tuple[np.ndarray, np.ndarray]:
+    """Values of a counter in proportion to time, and rise x share x (1 - share), which is zero at its samples."""
+    x, grid = (np.asarray(v - c.tai_ns[0], float) / NS for v in (tai_ns, c.tai_ns))
+    k = np.clip(np.searchsorted(grid, x, side="right") - 1, 0, len(grid) - 2)
+    f, rise = (x - grid[k]) / (grid[k + 1] - grid[k]), c.values[k + 1] - c.values[k]
+    return c.values[k] + f * rise, np.abs(rise) * f * (1 - f)
 
 
 def _risen(steps, what: str, names, tlm: Telemetry, tai_ns, doubts: list[str]):
@@ -180,15 +210,3 @@ def _risen(steps, what: str, names, tlm: Telemetry, tai_ns, doubts: list[str]):
         )
     broken = fell.any(axis=1)
     return np.where(broken[:, None], 0.0, np.maximum(steps, 0.0)), broken
-
-
-def _counted(tlm: Telemetry, names, tai_ns, on_steps, doubts: list[str]):
-    """Pulses as counted, at the instants of the on-times; thrusters that never fire need no counter."""
-    pulses, broken = np.zeros_like(on_steps), np.zeros(len(on_steps), bool)
-    for k, name in enumerate(names):
-        if f"pulse_count_{name}" in tlm:
-            c = tlm.channel(f"pulse_count_{name}").usable
-            inside = np.interp((tai_ns - tai_ns[0]) / NS, (c.tai_ns - tai_ns[0]) / NS, c.values)
-            rises, fell = _risen(np.diff(inside)[:, None], "pulse count", [name], tlm, tai_ns, doubts)
-            pulses[:, k], broken = rises[:, 0], broken | fell
-    return Guess(pulses, np.zeros_like(pulses), np.zeros_like(pulses)), broken

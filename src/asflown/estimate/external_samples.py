@@ -29,6 +29,7 @@ class Samples:
     rates: np.ndarray | None
     attitude: Rotation | None
     doubts: list[str]
+    splined_s: float = 0.0  # the coarsest cadence, where channels had to be splined to common instants
 
     @property
     def seconds(self) -> np.ndarray:
@@ -58,11 +59,13 @@ def samples_of(subject: Subject) -> Samples:
     quaternion = names if all(n in tlm for n in names) else []
     channels = [*(c for c, _ in stored), *rates]
     tai_ns, values = together(tlm, [*(c.name for c in channels), *quaternion])
+    splined_s = 0.0
     if len(tai_ns) > 0.5 * len(stored[0][0].usable.tai_ns):
         attitude = rotation(values[:, len(channels) :]) if quaternion else None
     else:
         doubts = [*doubts, "the channels are sampled at different instants: they are splined to common ones"]
         tai_ns, values, attitude = _splined(channels, together(tlm, quaternion) if quaternion else None)
+        splined_s = max(c.usable.cadence_ns for c in channels) / NS
         if quaternion and attitude is None:
             doubts.append("the parts of the quaternion are never known together: it is not used")
     if len(tai_ns) < FEWEST:
@@ -78,7 +81,7 @@ def samples_of(subject: Subject) -> Samples:
     else:
         missing = "body rates are not in the telemetry" if w is None else "the craft's inertia is not known"
         doubts = [*doubts, f"{missing}: the body's own momentum is left out"]
-    return Samples(tai_ns, each, body, w, attitude, [*doubts, *_gaps(tlm, tai_ns)])
+    return Samples(tai_ns, each, body, w, attitude, [*doubts, *_gaps(tlm, tai_ns)], splined_s)
 
 
 def _splined(channels: list[Channel], quaternion):

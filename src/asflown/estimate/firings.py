@@ -23,8 +23,12 @@ from .subject import Subject, subject_of
 
 #: Share of a wheel's rate limit at which its motor, and perhaps its telemetry, saturates.
 _SATURATED = 0.995
-#: After a pulse's order, what it gives is not all there for about so long. [s]
+#: Pulses a second times this is what a sample soon after some of them counts as not known. [s]
 _TAIL_S = 0.2
+#: While something fires, samples further apart than this are enough: the quietest of each such span is taken. [s]
+_ENOUGH_S = 8.0
+#: Share of the cadence within which a spline between samples smears a pulse.
+_SMEARED = 0.25
 
 
 @dataclass(frozen=True)
@@ -103,8 +107,6 @@ def firings_of(telemetry: Telemetry, craft: Craft) -> Firings:
     broken = np.zeros(len(tai_ns) - 1, bool)
     for k in np.flatnonzero(counters.broken):
         broken |= (tai_ns[:-1] < counters.tai_ns[k + 1]) & (tai_ns[1:] > counters.tai_ns[k])
-    if samples.rates is None:
-        doubts.append("without body rates the momentum of the body is missing, some 0.5 N m s at each instant")
     return Firings(
         subject=subject,
         thrusters=thrusters,
@@ -115,7 +117,7 @@ def firings_of(telemetry: Telemetry, craft: Craft) -> Firings:
         body=samples.body[chosen],
         rates=None if samples.rates is None else samples.rates[chosen],
         by_quaternion=samples.attitude is not None,
-        known=counters.at(tai_ns),
+        known=_smeared(counters.at(tai_ns), samples.splined_s),
         broken=broken,
         counters=counters,
         doubts=(*subject.doubts, *samples.doubts, *doubts, *_saturated(subject), *_branch(subject, thrusters)),
@@ -130,14 +132,20 @@ def _instants(s: Samples, counters: Counters) -> np.ndarray:
     tai_ns = s.tai_ns[inside]
     known = counters.at(tai_ns)
     unsure = (known.early + _TAIL_S * known.rate).sum(axis=1)
-    # every sample belongs to the counters' sample nearest to it
+    # every sample belongs to the counters' sample nearest to it, or to a span of several
     at = (counters.tai_ns - counters.tai_ns[0]) / NS
     nearest = np.searchsorted(0.5 * (at[1:] + at[:-1]), (tai_ns - counters.tai_ns[0]) / NS)
+    nearest = np.floor(at / _ENOUGH_S)[nearest]
     order = np.lexsort((unsure, nearest))
     best = order[np.unique(nearest[order], return_index=True)[1]]
     keep = unsure == 0
     keep[best] = True
     return inside[keep]
+
+
+def _smeared(known: Known, cadence_s: float) -> Known:
+    """With the pulses that a spline over so long a cadence moves to either side."""
+    return known._replace(early=known.early + _SMEARED * cadence_s * known.rate)
 
 
 def _turned(s: Samples) -> Rotation:

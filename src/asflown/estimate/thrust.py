@@ -79,6 +79,13 @@ def _joint(telemetry: list[Telemetry], craft: Craft, _: str, priors: Priors) -> 
     records, chains, doubts = [], [], list(priors.doubts)
     for number, tlm in enumerate(telemetry, 1):
         f = firings_of(tlm, craft)
+        if f.rates is None:
+            raise BadInput(
+                "body rates are not in the telemetry: between pulses the body holds what they gave, and the joint method needs it",
+                file=tlm.source or None,
+                channel="body_rate_x",
+                remedy="Add body_rate_x, _y and _z, or use --method printed.",
+            )
         check_names(f, priors)
         records.append(f)
         chains.append(momentum_chain(f, priors, number))

@@ -18,6 +18,8 @@ from .firings import Firings
 
 #: Quiet steps from which the samples' noise is taken; with fewer it is what the fit leaves.
 _QUIET = 12
+#: Steps count as no more than so many times the usual one; the noise is at least this share of all that is gained.
+_FAR, _LEAST = 4.0, 1e-4
 
 
 @dataclass(frozen=True)
@@ -92,11 +94,12 @@ class Chain:
     def _noise(self, left) -> np.ndarray:
         quiet = self.used & (self.on_time_s.sum(axis=1) == 0)
         quiet[1:] &= quiet[:-1]
-        if quiet.sum() >= _QUIET:
-            middle = np.median(np.abs(self.steps[quiet] - np.median(self.steps[quiet], axis=0)), axis=0) / 0.6745
-            if (middle > 0).all():
-                return 0.5 * middle**2
-        return 0.5 * (np.median(np.abs(left[self.used]), axis=0) / 0.6745) ** 2 + 1e-16
+        steps = self.steps[quiet] if quiet.sum() >= _QUIET else left[self.used]
+        typical = np.median(np.abs(steps), axis=0) / 0.6745
+        typical = np.where(typical > 0, typical, np.abs(steps).mean(axis=0))  # whole counts, most of them the same
+        kept = np.minimum(np.abs(steps), _FAR * typical)
+        least = _LEAST * np.abs(np.cumsum(self.steps[self.used], axis=0)).max()
+        return 0.5 * np.maximum(np.mean(kept**2, axis=0), least**2)
 
     def together(self) -> np.ndarray:
         """How much of their time each two thrusters fire together, (j, j): pairs come early and late at once."""
