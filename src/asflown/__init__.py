@@ -21,6 +21,8 @@ _PUBLIC = {
     "compare_torques": "asflown.estimate.compare",
     "external_torque": "asflown.estimate.external_torque",
     "ExternalTorque": "asflown.estimate.external_result",
+    "thrust": "asflown.estimate.thrust",
+    "ThrustResult": "asflown.estimate.thrust_result",
     "wheel_drag": "asflown.estimate.wheel_drag",
     "WheelsResult": "asflown.estimate.wheel_result",
     "inertia_tensor": "asflown.estimate.inertia",
@@ -73,6 +75,8 @@ if TYPE_CHECKING:
     from asflown.estimate.inertia import inertia_tensor
     from asflown.estimate.inertia_result import InertiaResult
     from asflown.estimate.result import TorqueResult
+    from asflown.estimate.thrust import thrust
+    from asflown.estimate.thrust_result import ThrustResult
     from asflown.estimate.torque import disturbance_torque
     from asflown.estimate.wheel_drag import wheel_drag
     from asflown.estimate.wheel_result import WheelsResult
