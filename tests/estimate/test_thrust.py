@@ -345,6 +345,8 @@ def test_nothing_fires_no_mass_and_other_refusals(day28, burn):
         thrust(tlm, CASSINI, variant="printed")
     with pytest.raises(BadInput, match="not known"):
         thrust(tlm, CASSINI, method="guess")
+    with pytest.raises(BadInput, match="no thrusters"):
+        thrust(tlm, load_craft("iss"))
     for bad in ({"fall_s": -1.0}, {"pulse_scatter": 2.0}, {"center_sigma_m": (0, 1, 1)}, {"mass_kg": 0.0}):
         with pytest.raises(BadInput):
             priors_for(CASSINI, **bad)

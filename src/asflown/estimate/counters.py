@@ -107,8 +107,6 @@ def counters_of(subject: Subject) -> tuple[tuple[Thruster, ...], Counters, list[
     """The craft's thrusters, their counters at instants that all share, and doubts."""
     tlm, craft = subject.telemetry, subject.craft.craft
     names = [t.name for t in craft.thrusters]
-    if not names:
-        raise BadInput(f"{craft.name} has no thrusters", remedy="Give its file [[thrusters]], or name another craft.")
     for stem in ("on_time", "pulse_count"):
         for name in tlm.members(stem):
             if name not in names:

@@ -15,7 +15,7 @@ import numpy as np
 from ..craft.model import Craft
 from ..dynamics.pulses import VARIANTS
 from ..kit.errors import BadInput, some_of
-from ..kit.timeline import NS
+from ..kit.timeline import NS, utc_label
 from ..telemetry.telemetry import Telemetry
 from .accelerometer import CHANNEL, velocity_chain
 from .firings import firings_of
@@ -30,6 +30,8 @@ METHODS = ("joint", "printed", "accelerometer")
 
 #: Records this far apart may have different thrusts. [days]
 _APART_DAYS = 60.0
+#: A prediction older than this is doubted. [days]
+_STALE_DAYS = 200.0
 #: Correlation beyond which thrust and fall time are not told apart, and share of a prior's sigma that data must beat.
 _TIED, _UNTOLD = 0.95, 0.8
 #: Share of the sigma of a thrust over the mean that is the centre of mass's, beyond which the two are not told apart.
@@ -71,7 +73,14 @@ def thrust(
         doubts.append(
             f"the records lie {max(days) - min(days):.0f} days apart and are given one thrust: it falls as propellant is used"
         )
-    predicted = craft.thrust_at(dated[0].epoch_ns) if dated and craft.thrust_history else None
+    predicted = None
+    if dated and craft.thrust_history:
+        predicted = craft.thrust_at(dated[0].epoch_ns)
+        last = max(h.date for h in craft.thrust_history)
+        if dated[0].epoch_ns - last > _STALE_DAYS * 86_400 * NS:
+            doubts.append(
+                f"the predicted thrust is that of {utc_label(last)[:10]}, the last one known: it has fallen since"
+            )
     return replace(done, predicted_N=predicted, doubts=tuple(dict.fromkeys(doubts)))
 
 

@@ -66,7 +66,10 @@ def priors_for(
     pulse_scatter: float | None = None,
     mass_kg: float | None = None,
 ) -> Priors:
-    """Those of a craft, with what the user says instead.  Raises BadInput for a value no prior can have."""
+    """Those of a craft, with what the user says instead.  Raises BadInput for a craft without thrusters and for a value that
+    no prior can have."""
+    if not craft.thrusters:
+        raise BadInput(f"{craft.name} has no thrusters", remedy="Give its file [[thrusters]], or name another --craft.")
     for value, what, option in (
         (fall_s, "fall time", "--fall-time"),
         (fall_sigma_s, "sigma of the fall time", "--fall-sigma"),
