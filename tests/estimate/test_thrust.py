@@ -269,7 +269,8 @@ def test_recovery_pulls_are_unit_normal_with_the_truth_from_the_priors():
     alone, both = np.array(found["alone"]), np.array(found["both"])
     assert np.std(alone[:, :4], axis=0) == pytest.approx(1.0, abs=0.2)
     assert abs(alone[:, 4].mean()) < 0.01
-    assert np.std(both[:, :4], axis=0) == pytest.approx(1.0, abs=0.3)
+    assert np.std(both[:, 1:4], axis=0) == pytest.approx(1.0, abs=0.2)
+    assert 0.5 < np.std(both[:, 0]) < 1.1  # sigma holds the pulses' scatter, which what flew has too
     assert np.std(both[:, 4]) < 0.008
 
 
