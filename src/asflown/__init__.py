@@ -24,6 +24,8 @@ _PUBLIC = {
     "leak": "asflown.estimate.leak",
     "LeakWatch": "asflown.estimate.leak",
     "LeakResult": "asflown.estimate.leak_result",
+    "thrust": "asflown.estimate.thrust",
+    "ThrustResult": "asflown.estimate.thrust_result",
     "wheel_drag": "asflown.estimate.wheel_drag",
     "WheelsResult": "asflown.estimate.wheel_result",
     "inertia_tensor": "asflown.estimate.inertia",
@@ -78,6 +80,8 @@ if TYPE_CHECKING:
     from asflown.estimate.leak import LeakWatch, leak
     from asflown.estimate.leak_result import LeakResult
     from asflown.estimate.result import TorqueResult
+    from asflown.estimate.thrust import thrust
+    from asflown.estimate.thrust_result import ThrustResult
     from asflown.estimate.torque import disturbance_torque
     from asflown.estimate.wheel_drag import wheel_drag
     from asflown.estimate.wheel_result import WheelsResult

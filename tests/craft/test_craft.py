@@ -133,3 +133,15 @@ def test_a_wrong_file_is_told_what_and_where(tmp_path, change, words):
 def test_an_unknown_craft_names_the_known_ones():
     with pytest.raises(BadInput, match="cassini, inspiresat1, iss"):
         load_craft("casini")
+
+
+def test_thrust_falls_with_the_tank_and_steps_at_its_recharge():
+    """001 section V: 0.97 N at launch, 0.75 and 0.69 N at Saturn; the tank was to be recharged in April 2006."""
+    cassini = load_craft("cassini")
+
+    def at(date: str) -> float:
+        return cassini.thrust_at(int(utc_to_tai_ns(date)))
+
+    assert [at("1997-01-01"), at("2004-06-30"), at("2005-01-14")] == [0.97, 0.75, 0.69]
+    assert 0.75 < at("2001-01-01") < 0.97
+    assert at("2006-04-14") == 0.69 and at("2006-04-15") == at("2008-01-01") == 1.01

@@ -57,21 +57,6 @@ def test_published_signs_of_the_eight_thrusters(cm):
     assert len({signs_of(c) for c in g.columns.T}) == 8
 
 
-@pytest.mark.parametrize(
-    ("on_time", "pulses", "fall", "ratio"),
-    [(0.125, 1, 0.065, 1.3590), (0.250, 1, 0.065, 1.1800), (0.125, 1, 0.040, 1.1595)],
-)
-def test_published_pulses_with_the_formula_put_right(on_time, pulses, fall, ratio):
-    """001 section V prints 1.395, 1.198 and 1.195, from a rise that begins before the delay."""
-    assert pulse_impulse(on_time, pulses, 0.005, 0.020, fall) / on_time == pytest.approx(ratio, abs=1e-4)
-
-
-def test_published_simulated_biasing_is_1_3099_times_its_on_time():
-    parts = np.array([[133 * 0.125, 133], [16 * 0.25, 16], [0.5, 1], [0.75, 1]])
-    whole = pulse_impulse(parts[:, 0], parts[:, 1], 0.005, 0.020, 0.065)
-    assert whole.sum() / parts[:, 0].sum() == pytest.approx(1.3099, abs=1e-4)
-
-
 # ---- laws ---------------------------------------------------------------------------------------------------
 
 

@@ -275,6 +275,6 @@ def test_bad_input_is_refused_in_words(case):
 
 def test_a_thrust_from_long_ago_is_doubted():
     assert (
-        "thrust is that of 2005-01-14"
+        "thrust is that of 2006-04-15"
         in fly("quiet", duration="10 s", thrusters={"center_of_mass": "0 0 1 m"}).doubts[-1]
     )

@@ -21,6 +21,7 @@ from . import (
     report,
     simulate,
     telemetry,
+    thrust,
     torque,
     trend,
     tune,
@@ -34,6 +35,7 @@ app.command("external-torque", short_help="The steady external torque, from mome
     external_torque.external_torque
 )
 app.command("leak", short_help="Leaking and weak thrusters, from residual momentum.")(leak.leak)
+app.command("thrust", short_help="Thrust, fall time and centre of mass, from wheel biasing and burns.")(thrust.thrust)
 app.command("simulate", short_help="Fly a scenario in the closed loop.")(simulate.simulate)
 app.command("budget", short_help="How wrong each method is, over many flights.")(budget.budget)
 app.command("tune", short_help="The papers' search for a smoothing span.")(tune.tune)

@@ -180,8 +180,11 @@ class Thruster(_Data):
 
 
 class ThrustHistory(_Data):
+    """Thrust at one date.  Entries of one ``piece`` are interpolated between; at a recharge of the tank a new one begins."""
+
     date: Date
     thrust: Newton
+    piece: str = ""
     source: str = ""
 
 
@@ -376,7 +379,7 @@ class Craft(_Data):
         return self.model_copy(update=changes)
 
     def thrust_at(self, tai_ns: int) -> float:
-        """Steady thrust of each thruster as predicted for a date: straight lines in time, held outside. [N]
+        """Steady thrust of each thruster as predicted for a date: straight lines in time within a piece, held outside. [N]
 
         Raises BadInput for a craft whose thrust is nowhere given."""
         known = sorted(self.thrust_history, key=lambda h: h.date)
@@ -385,7 +388,9 @@ class Craft(_Data):
                 f"the thrust of {self.name} is not known",
                 remedy="Give its file a [[thrust_history]], or say the thrust.",
             )
-        return float(np.interp(float(tai_ns), [float(h.date) for h in known], [h.thrust for h in known]))
+        begun = [h for h in known if h.date <= tai_ns] or known[:1]
+        piece = [h for h in known if h.piece == begun[-1].piece]
+        return float(np.interp(float(tai_ns), [float(h.date) for h in piece], [h.thrust for h in piece]))
 
     def at(self, tai_ns: int | None) -> CraftAt:
         """The craft on a date (None: the latest known state)."""

@@ -20,20 +20,25 @@ from .torque_momentum import actuators, splined
 
 @dataclass(frozen=True)
 class Samples:
-    """What all channels say at common instants: momentum of wheels and body (N, 3), body axes; body rates (N, 3) or None;
-    attitude, body to inertial, or None."""
+    """What all channels say at common instants: momentum of each wheel (N, n, 3) and of the body (N, 3), body axes; body
+    rates (N, 3) or None; attitude, body to inertial, or None."""
 
     tai_ns: np.ndarray
-    stored: np.ndarray
+    each: np.ndarray
     body: np.ndarray
     rates: np.ndarray | None
     attitude: Rotation | None
     doubts: list[str]
+    splined_s: float = 0.0  # the coarsest cadence, where channels had to be splined to common instants
 
     @property
     def seconds(self) -> np.ndarray:
         """From the first."""
         return (self.tai_ns - self.tai_ns[0]) / NS
+
+    @property
+    def stored(self) -> np.ndarray:
+        return self.each.sum(axis=1)
 
     @property
     def momentum(self) -> np.ndarray:
@@ -54,11 +59,13 @@ def samples_of(subject: Subject) -> Samples:
     quaternion = names if all(n in tlm for n in names) else []
     channels = [*(c for c, _ in stored), *rates]
     tai_ns, values = together(tlm, [*(c.name for c in channels), *quaternion])
+    splined_s = 0.0
     if len(tai_ns) > 0.5 * len(stored[0][0].usable.tai_ns):
         attitude = rotation(values[:, len(channels) :]) if quaternion else None
     else:
         doubts = [*doubts, "the channels are sampled at different instants: they are splined to common ones"]
         tai_ns, values, attitude = _splined(channels, together(tlm, quaternion) if quaternion else None)
+        splined_s = max(c.usable.cadence_ns for c in channels) / NS
         if quaternion and attitude is None:
             doubts.append("the parts of the quaternion are never known together: it is not used")
     if len(tai_ns) < FEWEST:
@@ -66,15 +73,15 @@ def samples_of(subject: Subject) -> Samples:
             f"{len(tai_ns)} instants at which all channels are known are too few",
             remedy=f"At least {FEWEST} are needed: take a longer record.",
         )
-    h = values[:, : len(stored)] @ np.array([d for _, d in stored])
+    each = values[:, : len(stored), None] * np.array([d for _, d in stored])
     w = values[:, len(stored) : len(channels)] if rates else None
-    body = np.zeros_like(h)
+    body = np.zeros((len(tai_ns), 3))
     if w is not None and I_B is not None:
         body = w @ I_B
     else:
         missing = "body rates are not in the telemetry" if w is None else "the craft's inertia is not known"
         doubts = [*doubts, f"{missing}: the body's own momentum is left out"]
-    return Samples(tai_ns, h, body, w, attitude, [*doubts, *_gaps(tlm, tai_ns)])
+    return Samples(tai_ns, each, body, w, attitude, [*doubts, *_gaps(tlm, tai_ns)], splined_s)
 
 
 def _splined(channels: list[Channel], quaternion):

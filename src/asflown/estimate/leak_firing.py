@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..craft.model import Craft
+from ..dynamics.pulses import Valve, moment_matrix
 from ..kit.errors import BadInput, some_of
 from ..kit.timeline import NS
 from ..telemetry.attitude import together
@@ -47,11 +48,10 @@ def geometry_of(craft: Craft) -> Geometry:
             remedy='Give it: --cm "x,y,z" in m, in the axes of the thrusters\' positions.',
         )
     along = np.array([t.direction for t in craft.thrusters], float)
-    arms = np.array([t.position for t in craft.thrusters], float) - craft.center_of_mass
     period = craft.wheel_controller.period if craft.wheel_controller else _SHORTEST_PULSE
     return Geometry(
         names=tuple(t.name for t in craft.thrusters),
-        columns=np.cross(arms, along).T,
+        columns=moment_matrix([t.position for t in craft.thrusters], along, craft.center_of_mass),
         directions=along.T,
         delay_s=np.array([t.delay for t in craft.thrusters]),
         rise_s=np.array([t.rise for t in craft.thrusters]),
@@ -62,15 +62,11 @@ def geometry_of(craft: Craft) -> Geometry:
 
 
 def pulse_impulse(on_time_s, pulses, delay_s, rise_s, fall_s) -> np.ndarray:
-    """Impulse over thrust of n pulses of T seconds in all, J/F = T + n (tf - tr + (tr - td - tf) exp(-(D - td)/tr)). [s]
-
-    D = T/n >= td, else nothing comes of them.  001 section V with its formula put right; broadcasts."""
-    n = np.asarray(pulses, float)
-    each = np.divide(on_time_s, n, out=np.full(np.shape(on_time_s), np.inf), where=n > 0)
-    rise = np.where(rise_s > 0, rise_s, 1e-12)
-    owed = np.exp(-np.maximum(each - delay_s, 0.0) / rise)
-    impulse = on_time_s + n * (fall_s - rise_s + (rise_s - delay_s - fall_s) * owed)
-    return np.where(each >= delay_s, impulse, 0.0)
+    """Impulse over thrust of n pulses of T seconds in all, each of T/n (dynamics.pulses); of none, the on-time. [s]"""
+    n, total = np.asarray(pulses, float), np.asarray(on_time_s, float)
+    each = total / np.where(n > 0, n, 1.0)
+    valve = Valve(delay_s, np.where(np.asarray(rise_s) > 0, rise_s, 1e-12), fall_s)
+    return np.where(n > 0, n * valve.effective(each), total)
 
 
 @dataclass(frozen=True)

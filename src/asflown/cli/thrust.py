@@ -1,0 +1,93 @@
+"""The verb `thrust`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+from .options import CHANNELS, CM, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP, craft_from, hashes, telemetry_from
+from .output import print_doubts, print_json, provenance, say
+
+
+def thrust(
+    files: list[Path] = typer.Argument(
+        help="Telemetry of one event, or of several together: CSV, Parquet, NetCDF or HDF5."
+    ),
+    craft: str = CRAFT,
+    method: str = typer.Option(
+        "joint", "--method", help="joint, printed (001 eqs 14-23) or accelerometer (001 Appendix D)."
+    ),
+    variant: str = typer.Option(
+        "corrected", "--variant", help="Pulse formula of printed and accelerometer: corrected, or printed."
+    ),
+    fall_time: str = typer.Option(None, "--fall-time", help="Fall time taken beforehand; the craft's, 65 ms."),
+    fall_sigma: str = typer.Option("13 ms", "--fall-sigma", help="Its sigma."),
+    cm: str = CM,
+    cm_sigma: str = typer.Option(
+        None, "--cm-sigma", help='Sigma of the centre of mass, as in "0.1 0.1 0.5 m" (the default where it is given).'
+    ),
+    pulse_scatter: float = typer.Option(0.02, "--pulse-scatter", help="One sigma from pulse to pulse, as a share."),
+    mass: str = typer.Option(None, "--mass", help='Mass of the craft, for the accelerometer, as in "3160 kg".'),
+    start: str = START,
+    stop: str = STOP,
+    channels: Path = CHANNELS,
+    exclude: Path = EXCLUDE,
+    inertia: str = INERTIA,
+    store: str = typer.Option(None, "--store", help="Keep the result in a trend store: a path (SQLite) or a URL."),
+    name: str = typer.Option(None, "--id", help="Its name in the store; the date unless given."),
+    plot: Path = typer.Option(
+        None, "--plot", help="Draw wheels, on-times and thrusts (SVG, PNG or PDF by its suffix)."
+    ),
+    json: bool = JSON,
+) -> None:
+    """Thrust of every thruster, fall time and centre of mass, from wheel biasing, run-downs and burns."""
+    from asflown.estimate.thrust import thrust as thrust_of
+    from asflown.estimate.thrust_priors import priors_for
+    from asflown.kit.files import check_place
+    from asflown.kit.quantities import numbers, quantity
+
+    if plot is not None:
+        from asflown.plots.figure import picture_kind
+
+        check_place(plot)
+        picture_kind(plot)
+    ship = craft_from(craft, inertia, cm)
+    priors = priors_for(
+        ship,
+        fall_s=None if fall_time is None else quantity(fall_time, "s"),
+        fall_sigma_s=quantity(fall_sigma, "s"),
+        center_sigma_m=None if cm_sigma is None else numbers(cm_sigma, "m", 3),
+        pulse_scatter=pulse_scatter,
+        mass_kg=None if mass is None else quantity(mass, "kg"),
+    )
+    read = [telemetry_from(f, channels, exclude, start, stop, ship) for f in files]
+    telemetry = [t for t, _ in read]
+    inputs = {k: v for _, found in read for k, v in found.items()}
+    result = thrust_of(telemetry, ship, method=method, variant=variant, priors=priors)
+    options = {"craft": craft, "method": method, "variant": variant, "fall_time": fall_time, "fall_sigma": fall_sigma, "cm": cm,
+               "cm_sigma": cm_sigma, "pulse_scatter": pulse_scatter, "mass": mass, "start": start, "stop": stop,
+               "inertia": inertia}  # fmt: skip
+    origin = provenance(inputs | hashes(craft), options)
+    if store is not None:
+        kept = _kept(store, name, result, telemetry[0], ship, origin)
+        say(f"kept as {kept.event}, revision {kept.revision}")
+    if plot is not None:
+        from asflown.plots.thrust import save_thrust_figure
+
+        save_thrust_figure(result, plot)
+        say(f"wrote {plot}")
+    if json:
+        print_json({"command": "thrust"} | result.record() | {"provenance": origin})
+        return
+    print(result)
+    print_doubts(result.doubts)
+
+
+def _kept(store: str, name: str | None, result, telemetry, ship, origin):
+    from asflown.trends.store import TrendStore
+    from asflown.trends.thrust_entry import thrust_entry
+
+    entry = thrust_entry(result, telemetry, ship, name, origin)
+    with TrendStore.open(store) as trends:
+        return trends.add(entry)[0]
