@@ -54,6 +54,7 @@ def test_recovery_of_a_thruster_that_degrades_and_what_would_have_been_seen():
     assert 2 < newest.detectable() < 8 and newest.power(15) > 0.95
 
 
+@pytest.mark.slow
 def test_recovery_of_degradation_comes_with_the_stated_power():
     """6 % less of one thruster, thirteen events, eight thrusters watched: as often an alarm as is said, and hardly without."""
     found = [judge(records(s, weak=0.94), kind="thrust").figure("thrust_Z3_over_mean") for s in range(60)]
