@@ -10,6 +10,7 @@ from asflown.kit.errors import BadInput
 CASSINI = load_craft("cassini")
 
 
+@pytest.mark.slow
 def test_published_about_ten_percent_is_no_bound():
     """Printed momentum without noise: -63 % at rises of 5 s, +19 % at 10 s (000 says about 10 %)."""
     for rise, expected in ((5.0, -63), (10.0, 19)):

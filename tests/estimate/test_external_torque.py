@@ -166,6 +166,7 @@ def flown_pulls(scenario: str, seeds, **changes):
     return np.array(pulls), np.array(within)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scenario, duration", [("quiet", "480 s"), ("slews", "2400 s")])
 def test_recovery_pulls_of_short_flights(scenario, duration):
     pulls, within = flown_pulls(scenario, range(20), duration=duration)

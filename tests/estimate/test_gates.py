@@ -234,6 +234,7 @@ def test_bad_choices_are_refused(main_set):
         fit_gates(replace(main_set, sigma_magnitude_mps=np.zeros(48)), likelihood="printed")
 
 
+@pytest.mark.slow
 def test_recovery_bootstrap_says_what_many_sets_say():
     fits = [fit_gates(execute(MAIN, MAIN_ENGINE_SET, [9, n])).magnitude.point for n in range(150)]
     spread = np.std([f.fixed for f in fits]), np.std([f.beta[0] for f in fits])
@@ -258,6 +259,7 @@ def test_recovery_of_the_2012_models(engine):
         assert 0.3 <= campaign(engine, 100)["magnitude proportional"]["at_bound"] <= 0.5
 
 
+@pytest.mark.slow
 def test_recovery_quick_intervals_cover():
     """100 sets of each engine: coverage of all intervals together within 3 sigma of 95 %."""
     from gates_recovery import campaign

@@ -115,6 +115,7 @@ def test_law_an_outlier_is_judged_by_the_model_without_it():
     assert found.sufficient is False and any("not sufficient" in d for d in found.doubts)
 
 
+@pytest.mark.slow
 def test_recovery_outliers_are_rarely_false():
     """The false-discovery rule flags in 5 % of clean sets or fewer; two sigma flags in nearly all."""
     found = [judge_gates(fit_gates(execute(MAIN.model, MAIN_ENGINE_SET, [8, n])), draws=10).outliers for n in range(60)]
@@ -147,6 +148,7 @@ def test_envelope_and_distribution_of_a_right_model():
     assert judge_gates(fit_gates(heavy), draws=200).spreads[0].shape_p < 0.05
 
 
+@pytest.mark.slow
 def test_against_its_own_model_nothing_is_outside_too_often():
     outside = 0
     for n in range(30):

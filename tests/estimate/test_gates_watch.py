@@ -61,6 +61,7 @@ def test_recovery_alarms_come_in_the_share_the_power_curve_says(weaker):
     assert found["early"] <= 0.05 + 0.033
 
 
+@pytest.mark.slow
 def test_recovery_quick_false_alarms_and_power():
     watches = flown(0.05, 60, 3)
     found = told(watches)

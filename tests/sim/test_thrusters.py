@@ -86,6 +86,7 @@ def test_law_momentum_balances_with_every_thruster(name):
     assert np.abs(H[1:] - H[0] - gained).max() < 1e-6 * np.abs(gained).max()
 
 
+@pytest.mark.slow
 def test_law_the_truth_of_each_pulse_adds_up():
     flight = fly("wheel-bias-day28", thrusters={"pulse_scatter": 0.0})
     fired = flight.truth.thrusters
@@ -126,6 +127,7 @@ def test_published_on_times_of_28_january_2005():
     assert np.mean([f.pulses[-1, 4] for f in flights]) == pytest.approx(75, rel=0.05)
 
 
+@pytest.mark.slow
 def test_law_a_thrust_is_found_back_from_wheels_and_on_times():
     """Momentum balance about z over the whole bias, noise-free, with the pulses' own ratio."""
     flight = fly("wheel-bias-fsds", noise="none")

@@ -42,6 +42,7 @@ def test_law_five_events_have_all_their_shuffles():
     assert trend_of(Values(day, 1 + day + noise, np.zeros(5))).p_value <= 2 / 120
 
 
+@pytest.mark.slow
 def test_recovery_intervals_hold_and_false_trends_are_rare():
     """120 histories: a share of 0.95 scatters by 0.02."""
     held, false = [], []
@@ -92,6 +93,7 @@ def test_recovery_forecast_band_holds_and_limits_are_crossed_in_order():
     assert t.crossing(1000.0) == (None, None)
 
 
+@pytest.mark.slow
 def test_recovery_newest_raises_false_alarms_at_its_rate_and_sees_what_it_says():
     p, power, seen = [], [], []
     for seed in range(150):

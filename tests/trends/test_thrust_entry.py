@@ -64,6 +64,7 @@ def test_recovery_of_degradation_comes_with_the_stated_power():
     assert np.mean([v == "alarm" for v in quiet]) <= 0.15
 
 
+@pytest.mark.slow
 def test_recovery_of_a_thrust_that_falls_faster_than_predicted():
     """The recharge of April 2006, 0.69 to 1.01 N, is in the prediction and leaves no trace in the ratio."""
     found = [judge(records(s), kind="thrust").figure("thrust_over_prediction").trend for s in range(20)]
