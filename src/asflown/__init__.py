@@ -21,6 +21,8 @@ _PUBLIC = {
     "compare_torques": "asflown.estimate.compare",
     "external_torque": "asflown.estimate.external_torque",
     "ExternalTorque": "asflown.estimate.external_result",
+    "density": "asflown.estimate.density",
+    "DensityResult": "asflown.estimate.density_result",
     "leak": "asflown.estimate.leak",
     "LeakWatch": "asflown.estimate.leak",
     "LeakResult": "asflown.estimate.leak_result",
@@ -67,6 +69,8 @@ if TYPE_CHECKING:
     from asflown.craft.load import built_in_crafts, load_craft
     from asflown.craft.model import Craft
     from asflown.estimate.compare import compare_torques
+    from asflown.estimate.density import density
+    from asflown.estimate.density_result import DensityResult
     from asflown.estimate.external_result import ExternalTorque
     from asflown.estimate.external_torque import external_torque
     from asflown.estimate.gates_fit import fit_gates

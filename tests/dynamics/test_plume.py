@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import signal
 
 from asflown.craft.load import load_craft
 from asflown.dynamics.drag import PRINTED_E3, arm, torque_per_density
 from asflown.dynamics.environment import gravity_gradient, gravity_gradient_bound, magnetic_torque_bound
 from asflown.dynamics.flyby import enceladus, flyby_called, flybys, published_peaks, tables
+from asflown.dynamics.loop import error_per_torque
 from asflown.dynamics.plume import (
     as_passed,
     density_by_altitude,
@@ -149,6 +151,19 @@ def test_published_model_error_is_a_root():
     assert model_error(t, off, 0 * t) == pytest.approx(0.435e-12)
     assert model_error(t, off, 0 * t, "printed") == pytest.approx(0.435e-12**2)
     assert 0.435 / 5.96 == pytest.approx(0.073, abs=0.0005)  # printed 7.5 %
+
+
+def test_published_peak_of_the_attitude_error_comes_too_late_for_that_of_the_torque():
+    """004: torque +34 s, attitude error +54 s.  Its own loop is late by 18.4 s at most, by 2.4 s for Table 3's torque."""
+    k = CASSINI.wheel_controller
+    w, z = k.natural_frequency_rad_s, k.damping
+    assert np.pi / (w * np.sqrt(1 - z**2)) == pytest.approx(18.4, abs=0.05)
+    t = np.arange(0.0, 200.0, 0.1)  # nothing before closest approach: the jets are below the horizon there
+    torque = -PRINTED_E3 * plume_density(JETS.values(), E3, t, variant="printed")
+    torque = np.where(t > 0, torque, 0.0)
+    _, error, _ = signal.lsim(error_per_torque(k, 3640.4), torque, t)
+    lag = t[np.argmax(np.abs(error))] - t[np.argmax(np.abs(torque))]
+    assert lag == pytest.approx(2.4, abs=0.25)  # s
 
 
 # ---- laws ---------------------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ from . import (
     budget,
     craft,
     demo,
+    density,
     external_torque,
     gates,
     inertia,
@@ -33,6 +34,7 @@ app.command("wheels", short_help="Bearing drag of the wheels, and how they were 
 app.command("external-torque", short_help="The steady external torque, from momentum gained.")(
     external_torque.external_torque
 )
+app.command("density", short_help="Density of the gas met in a flyby, from its torque.")(density.density)
 app.command("leak", short_help="Leaking and weak thrusters, from residual momentum.")(leak.leak)
 app.command("simulate", short_help="Fly a scenario in the closed loop.")(simulate.simulate)
 app.command("budget", short_help="How wrong each method is, over many flights.")(budget.budget)
