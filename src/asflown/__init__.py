@@ -23,6 +23,8 @@ _PUBLIC = {
     "ExternalTorque": "asflown.estimate.external_result",
     "density": "asflown.estimate.density",
     "DensityResult": "asflown.estimate.density_result",
+    "jets": "asflown.estimate.jets",
+    "JetsResult": "asflown.estimate.jets_result",
     "leak": "asflown.estimate.leak",
     "LeakWatch": "asflown.estimate.leak",
     "LeakResult": "asflown.estimate.leak_result",
@@ -79,6 +81,8 @@ if TYPE_CHECKING:
     from asflown.estimate.gates_watch import watch_maneuvers
     from asflown.estimate.inertia import inertia_tensor
     from asflown.estimate.inertia_result import InertiaResult
+    from asflown.estimate.jets import jets
+    from asflown.estimate.jets_result import JetsResult
     from asflown.estimate.leak import LeakWatch, leak
     from asflown.estimate.leak_result import LeakResult
     from asflown.estimate.result import TorqueResult

@@ -18,6 +18,7 @@ from . import (
     external_torque,
     gates,
     inertia,
+    jets,
     leak,
     report,
     simulate,
@@ -35,6 +36,7 @@ app.command("external-torque", short_help="The steady external torque, from mome
     external_torque.external_torque
 )
 app.command("density", short_help="Density of the gas met in a flyby, from its torque.")(density.density)
+app.command("jets", short_help="Jets of a plume, from the momentum they gave.")(jets.jets)
 app.command("leak", short_help="Leaking and weak thrusters, from residual momentum.")(leak.leak)
 app.command("simulate", short_help="Fly a scenario in the closed loop.")(simulate.simulate)
 app.command("budget", short_help="How wrong each method is, over many flights.")(budget.budget)

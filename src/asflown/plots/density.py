@@ -1,4 +1,4 @@
-"""Density along a flyby, with both its errors and the peaks that others found."""
+"""Density along a flyby, with both its errors and the peaks that others found, and the jets that make it."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import textwrap
 
 import numpy as np
 
+from ..dynamics.plume import jet_density
 from ..estimate.density_result import DensityResult
-from .figure import BLUE, GREY, ORANGE, RED, new_figure, save
+from ..estimate.jets_result import JetsResult
+from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, new_figure, save
 
 _SHOWN_S = (-60.0, 180.0)  # where a plume is met
 _SCALE = 1e12
@@ -50,12 +52,36 @@ def draw_bound(result: DensityResult, ax):
     return ax
 
 
+def draw_jets(result: JetsResult, ax):
+    """Density of the jets together and of each, as in 004 Figures 11 and 12.  Returns ax."""
+    d = result.density
+    ax.plot(d.time_s, _SCALE * result.model_kgm3, color=RED, linewidth=1.4, label="jets together")
+    for source, color in zip(result.sources, (GREEN, ORANGE, PURPLE), strict=False):
+        rho = jet_density(source.jet, d.flyby, d.time_s, power=result.power, angle=result.angle)
+        known = "" if source.density_known else " (not identified)"
+        ax.plot(d.time_s, _SCALE * rho, color=color, linewidth=1.0, label=source.jet.name + known)
+    return ax
+
+
 def save_density_figure(result: DensityResult, path) -> None:
-    """One panel, altitude along its top, doubts beneath."""
+    """Density, bound and published peaks; altitude along the top, doubts beneath."""
     figure, (ax,) = new_figure(1, height=4.4)
     draw_density(result, ax)
     draw_bound(result, ax)
     draw_published_peaks(result, ax)
+    _finish(figure, ax, result, f"Density met by {result.craft}, {result.flyby.name}", result.doubts, path)
+
+
+def save_jets_figure(result: JetsResult, path) -> None:
+    """The jets' density over the one reconstructed; altitude along the top, doubts beneath."""
+    figure, (ax,) = new_figure(1, height=4.4)
+    draw_density(result.density, ax)
+    draw_jets(result, ax)
+    d = result.density
+    _finish(figure, ax, d, f"Jets met by {d.craft}, {d.flyby.name}: power {result.power:g}", result.doubts, path)
+
+
+def _finish(figure, ax, result: DensityResult, title: str, doubts, path) -> None:
     low, high = max(_SHOWN_S[0], result.time_s[0]), min(_SHOWN_S[1], result.time_s[-1])
     if high > low:
         ax.set_xlim(low, high)
@@ -64,9 +90,9 @@ def save_density_figure(result: DensityResult, path) -> None:
         top.set_xticks(ticks, [f"{result.flyby.altitude(v) / 1e3:.0f}" for v in ticks])
         top.set_xlabel("altitude [km]")
     ax.legend(frameon=False, fontsize=8)
-    ax.set_title(f"Density met by {result.craft}, {result.flyby.name}", loc="left", fontsize=11)
+    ax.set_title(title, loc="left", fontsize=11)
     ax.set_xlabel(f"time from closest approach, {result.closest_approach} [s]")
-    if result.doubts:
-        text = "\n".join(textwrap.fill("DOUBT " + d, 125) for d in result.doubts[:4])
+    if doubts:
+        text = "\n".join(textwrap.fill("DOUBT " + d, 125) for d in doubts[:4])
         figure.supxlabel(text, fontsize=6.5, color=RED, x=0.02, ha="left")
     save(figure, path)
