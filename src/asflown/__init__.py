@@ -21,6 +21,10 @@ _PUBLIC = {
     "compare_torques": "asflown.estimate.compare",
     "external_torque": "asflown.estimate.external_torque",
     "ExternalTorque": "asflown.estimate.external_result",
+    "density": "asflown.estimate.density",
+    "DensityResult": "asflown.estimate.density_result",
+    "jets": "asflown.estimate.jets",
+    "JetsResult": "asflown.estimate.jets_result",
     "leak": "asflown.estimate.leak",
     "LeakWatch": "asflown.estimate.leak",
     "LeakResult": "asflown.estimate.leak_result",
@@ -69,6 +73,8 @@ if TYPE_CHECKING:
     from asflown.craft.load import built_in_crafts, load_craft
     from asflown.craft.model import Craft
     from asflown.estimate.compare import compare_torques
+    from asflown.estimate.density import density
+    from asflown.estimate.density_result import DensityResult
     from asflown.estimate.external_result import ExternalTorque
     from asflown.estimate.external_torque import external_torque
     from asflown.estimate.gates_fit import fit_gates
@@ -77,6 +83,8 @@ if TYPE_CHECKING:
     from asflown.estimate.gates_watch import watch_maneuvers
     from asflown.estimate.inertia import inertia_tensor
     from asflown.estimate.inertia_result import InertiaResult
+    from asflown.estimate.jets import jets
+    from asflown.estimate.jets_result import JetsResult
     from asflown.estimate.leak import LeakWatch, leak
     from asflown.estimate.leak_result import LeakResult
     from asflown.estimate.result import TorqueResult

@@ -18,6 +18,8 @@ TEXTS = {
     "torque-momentum": ["torque", "t.csv", "--axis", "y", "--method", "momentum"],
     "torque-printed": ["torque", "t.csv", "--axis", "y", "--variant", "printed"],
     "leak": ["leak", "t.csv", "--cm", "0,0,1.35", "--stop", "180"],
+    "density": ["density", "t.csv", "--flyby", "E3", "--closest-approach", "200", "--axis", "y", "--arm", "0.9 m",
+                "--method", "momentum"],
     "telemetry-check": ["telemetry", "check", "t.csv"],
     "craft-show-cassini": ["craft", "show", "cassini", "--at", "2005-02-09"],
     "craft-list": ["craft", "list"],

@@ -14,9 +14,11 @@ from . import (
     budget,
     craft,
     demo,
+    density,
     external_torque,
     gates,
     inertia,
+    jets,
     leak,
     report,
     simulate,
@@ -34,6 +36,8 @@ app.command("wheels", short_help="Bearing drag of the wheels, and how they were 
 app.command("external-torque", short_help="The steady external torque, from momentum gained.")(
     external_torque.external_torque
 )
+app.command("density", short_help="Density of the gas met in a flyby, from its torque.")(density.density)
+app.command("jets", short_help="Jets of a plume, from the momentum they gave.")(jets.jets)
 app.command("leak", short_help="Leaking and weak thrusters, from residual momentum.")(leak.leak)
 app.command("thrust", short_help="Thrust, fall time and centre of mass, from wheel biasing and burns.")(thrust.thrust)
 app.command("simulate", short_help="Fly a scenario in the closed loop.")(simulate.simulate)

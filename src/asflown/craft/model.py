@@ -285,10 +285,17 @@ class Accelerometer(_Data):
 
 
 class Aerodynamics(_Data):
-    drag_coefficient: float
-    drag_coefficient_sigma: float
-    projected_area: Metre2
-    moment_arm: Metre
+    """Drag of a thin gas (004 eq 21) in the attitude of one ``flyby``; ``moment_arm`` about ``axis``.
+
+    ``scale_sigma``: one sigma of C_D V^2 area arm together, as a share."""
+
+    drag_coefficient: float = Field(gt=0)
+    drag_coefficient_sigma: float = Field(ge=0)
+    projected_area: Metre2 = Field(gt=0)
+    moment_arm: Metre = Field(gt=0)
+    axis: Literal["x", "y", "z"] = "z"
+    flyby: str = ""
+    scale_sigma: Annotated[float, BeforeValidator(lambda v: quantity(v, ""))] | None = Field(default=None, ge=0)
     source: str = ""
 
 

@@ -1,0 +1,62 @@
+"""The verb `density`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+from .flyby_options import AREA, ARM, AXIS, CLOSEST, FLYBY, METHOD, UP, VELOCITY, drag_from
+from .options import CHANNELS, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP, craft_from, hashes, telemetry_from
+from .output import print_doubts, print_json, provenance, say
+
+
+def density(
+    file: Path = typer.Argument(help="Telemetry: CSV (plain or gzip), Parquet, NetCDF or HDF5."),
+    flyby: str = FLYBY,
+    closest_approach: str = CLOSEST,
+    craft: str = CRAFT,
+    axis: str = AXIS,
+    method: str = METHOD,
+    variant: str = typer.Option(
+        "corrected", "--variant", help="corrected, or printed: 004's constant and errors (E3)."
+    ),
+    area: str = AREA,
+    arm: str = ARM,
+    velocity: str = VELOCITY,
+    up: str = UP,
+    start: str = START,
+    stop: str = STOP,
+    channels: Path = CHANNELS,
+    exclude: Path = EXCLUDE,
+    inertia: str = INERTIA,
+    plot: Path = typer.Option(None, "--plot", help="Draw the density (SVG, PNG or PDF by its suffix)."),
+    json: bool = JSON,
+) -> None:
+    """Density of the gas that a craft meets in a flyby, from the torque it exerts."""
+    from asflown.estimate.density import density as density_of
+    from asflown.kit.files import check_place
+
+    if plot is not None:
+        from asflown.plots.figure import picture_kind
+
+        check_place(plot)
+        picture_kind(plot)
+    ship = craft_from(craft, inertia, None)
+    telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
+    drag = drag_from(axis, method, area, arm, velocity, up)
+    result = density_of(telemetry, ship, flyby, closest_approach, variant=variant, **drag)
+    if plot is not None:
+        from asflown.plots.density import save_density_figure
+
+        save_density_figure(result, plot)
+        say(f"wrote {plot}")
+    if json:
+        options = {"craft": craft, "flyby": result.flyby.name, "closest_approach": closest_approach, "axis": result.axis,
+                   "method": result.method, "variant": variant, "area": area, "arm": arm, "velocity": velocity, "up": up,
+                   "start": start, "stop": stop, "inertia": inertia}  # fmt: skip
+        record = {"command": "density"} | result.record()
+        print_json(record | {"provenance": provenance(inputs | hashes(craft), options)})
+        return
+    print(result)
+    print_doubts(result.doubts)

@@ -1,0 +1,66 @@
+"""The verb `jets`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+from .flyby_options import AREA, ARM, AXIS, CLOSEST, FLYBY, METHOD, UP, VELOCITY, drag_from
+from .options import CHANNELS, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP, craft_from, hashes, telemetry_from
+from .output import print_doubts, print_json, provenance, say
+
+
+def jets(
+    file: Path = typer.Argument(help="Telemetry: CSV (plain or gzip), Parquet, NetCDF or HDF5."),
+    flyby: str = FLYBY,
+    closest_approach: str = CLOSEST,
+    craft: str = CRAFT,
+    axis: str = AXIS,
+    method: str = METHOD,
+    sources: str = typer.Option(None, "--sources", help='Which of "Alexandria,Cairo,Damascus"; all unless given.'),
+    widths: str = typer.Option("own", "--widths", help="Each jet its own, or one common."),
+    power: float = typer.Option(1.0, "--power", help="n of exp(-(angle/width)^n): 1 as 004 eq 26 stands, 2 as eq 24."),
+    angle: str = typer.Option("plane", "--angle", help="From a jet's axis: in the flyby's plane, or in space."),
+    area: str = AREA,
+    arm: str = ARM,
+    velocity: str = VELOCITY,
+    up: str = UP,
+    start: str = START,
+    stop: str = STOP,
+    channels: Path = CHANNELS,
+    exclude: Path = EXCLUDE,
+    inertia: str = INERTIA,
+    plot: Path = typer.Option(None, "--plot", help="Draw jets and density (SVG, PNG or PDF by its suffix)."),
+    json: bool = JSON,
+) -> None:
+    """Densities and widths of a plume's jets, from the momentum they gave a craft; what the telemetry does not tell is said."""
+    from asflown.estimate.jets import jets as fitted_jets
+    from asflown.kit.files import check_place
+
+    if plot is not None:
+        from asflown.plots.figure import picture_kind
+
+        check_place(plot)
+        picture_kind(plot)
+    ship = craft_from(craft, inertia, None)
+    telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
+    drag = drag_from(axis, method, area, arm, velocity, up)
+    names = None if sources is None else [n.strip().capitalize() for n in sources.split(",")]
+    result = fitted_jets(
+        telemetry, ship, flyby, closest_approach, names=names, widths=widths, power=power, angle=angle, **drag
+    )
+    if plot is not None:
+        from asflown.plots.density import save_jets_figure
+
+        save_jets_figure(result, plot)
+        say(f"wrote {plot}")
+    if json:
+        options = {"craft": craft, "flyby": result.density.flyby.name, "closest_approach": closest_approach, "axis": axis, "method": method,
+                   "sources": sources, "widths": widths, "power": power, "angle": angle, "area": area, "arm": arm, "velocity": velocity,
+                   "up": up, "start": start, "stop": stop, "inertia": inertia}  # fmt: skip
+        record = {"command": "jets"} | result.record()
+        print_json(record | {"provenance": provenance(inputs | hashes(craft), options)})
+        return
+    print(result)
+    print_doubts(result.doubts)

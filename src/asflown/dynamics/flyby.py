@@ -1,0 +1,160 @@
+"""A flyby on a straight line at constant speed, and the flybys, jets and peaks that were published (004 Tables 1 to 4).
+
+Time counts from closest approach.  Gravity bends the path by 2 mu / (v^2 r): 2.3e-4 rad for E3, 1e-3 for the slow E9; over
+the minute in which a plume acts the place is off by some 100 m.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+
+import numpy as np
+
+from ..kit.errors import BadInput, some_of
+from ..kit.quantities import quantity
+
+
+@dataclass(frozen=True)
+class Moon:
+    """A body passed: radius [m], gravitational parameter [m3/s2], the magnetic field there and its change by the plume."""
+
+    radius_m: float
+    mu_m3_s2: float
+    field_T: float
+    field_change: float
+
+
+@dataclass(frozen=True)
+class Flyby:
+    """Where and how fast a craft passes a moon.  South latitude and west longitude of closest approach may be unknown.
+
+    ``noticed_s``: when the control loop first and last noticed the plume (004's points P and R)."""
+
+    name: str
+    moon: Moon
+    altitude_m: float
+    speed_m_s: float
+    latitude_south_rad: float | None = None
+    longitude_west_rad: float | None = None
+    date: str = ""
+    noticed_s: tuple[float, float] | None = None
+    source: str = ""
+
+    @property
+    def closest_m(self) -> float:
+        """Least distance from the moon's centre."""
+        return self.moon.radius_m + self.altitude_m
+
+    def distance(self, time_s) -> np.ndarray:
+        """From the moon's centre. [m]"""
+        return np.hypot(self.closest_m, self.speed_m_s * np.asarray(time_s, float))
+
+    def altitude(self, time_s) -> np.ndarray:
+        """Above the moon's sphere. [m]   004 section V: 322.3 km at +34 s of E3"""
+        return self.distance(time_s) - self.moon.radius_m
+
+    def climb_rate(self, time_s) -> np.ndarray:
+        """d altitude / dt. [m/s]"""
+        return self.speed_m_s**2 * np.asarray(time_s, float) / self.distance(time_s)
+
+    def in_plane(self, time_s) -> np.ndarray:
+        """From the moon's centre, in the plane of trajectory and spin axis: away from the axis on the side of closest
+        approach, and towards the south pole. (N, 2) [m]   004 eq 23
+
+        Raises BadInput for a flyby whose latitude is not known."""
+        if self.latitude_south_rad is None:
+            raise BadInput(
+                f"the latitude of {self.name}'s closest approach is not known, and a jet's distance needs it",
+                remedy="Use a flyby of Table 1 (E3, E4, E9).",
+            )
+        out, along = self.closest_m, self.speed_m_s * np.asarray(time_s, float)
+        south = self.latitude_south_rad
+        return np.stack(
+            [out * np.cos(south) - along * np.sin(south), out * np.sin(south) + along * np.cos(south)], axis=-1
+        )
+
+    def position(self, time_s, up_B, velocity_B) -> np.ndarray:
+        """Of the craft from the moon's centre in the axes of a body that does not turn. (N, 3) [m]
+
+        up_B: from the moon's centre to the craft at closest approach; velocity_B: of the craft's motion; directions in
+        body axes.  Raises BadInput where the two are not perpendicular to 1 degree, as they are at closest approach."""
+        up, velocity = (np.asarray(v, float) / max(float(np.linalg.norm(v)), 1e-300) for v in (up_B, velocity_B))
+        if min(np.linalg.norm(up), np.linalg.norm(velocity)) < 0.5 or abs(up @ velocity) > np.sin(np.radians(1)):
+            raise BadInput(
+                "at closest approach the velocity is perpendicular to the vertical, and these two directions are not",
+                remedy="Give both in body axes: from the moon's centre to the craft at closest approach, and where it flies.",
+            )
+        along = self.speed_m_s * np.asarray(time_s, float)
+        return self.closest_m * up + along[..., None] * velocity
+
+
+@dataclass(frozen=True)
+class PublishedPeak:
+    """A row of 004 Table 4: by whom, when and how dense; ``density_kgm3`` from and to."""
+
+    instrument: str
+    flyby: str
+    time_s: float
+    altitude_m: float
+    density_kgm3: tuple[float, float]
+    sigma_kgm3: float | None
+
+
+@cache
+def tables() -> dict:
+    """The tables as they stand in the file, values with their units."""
+    return tomllib.loads((resources.files("asflown.dynamics") / "enceladus.toml").read_text(encoding="utf-8"))
+
+
+@cache
+def enceladus() -> Moon:
+    m = tables()["moon"]
+    return Moon(
+        quantity(m["radius"], "m"),
+        quantity(m["gravitational_parameter"], "m3/s2"),
+        quantity(m["field"], "T"),
+        quantity(m["field_change"], ""),
+    )
+
+
+@cache
+def flybys() -> tuple[Flyby, ...]:
+    """Every flyby of the tables."""
+    return tuple(_flyby(row) for row in tables()["flyby"])
+
+
+def flyby_called(name: str) -> Flyby:
+    """'E3', 'e3' or 'enceladus-3'.  Raises BadInput for one that is not there."""
+    short = name.strip().upper().replace("ENCELADUS-", "E")
+    for f in flybys():
+        if f.name == short:
+            return f
+    raise BadInput(f"{name!r} is no flyby of the tables", remedy=f"Name one of: {some_of(f.name for f in flybys())}.")
+
+
+@cache
+def published_peaks() -> tuple[PublishedPeak, ...]:
+    """004 Table 4."""
+    peaks = []
+    for row in tables()["peak"]:
+        density = [quantity(v, "kg/m3") for v in row["density"]]
+        sigma = quantity(row["sigma"], "kg/m3") if "sigma" in row else None
+        peaks.append(
+            PublishedPeak(
+                row["instrument"], row["flyby"], quantity(row["time"], "s"), quantity(row["altitude"], "m"),
+                (density[0], density[-1]), sigma,
+            )
+        )  # fmt: skip
+    return tuple(peaks)
+
+
+def _flyby(row: dict) -> Flyby:
+    noticed = [quantity(t, "s") for t in row.get("noticed", ())]
+    south, west = (quantity(row[k], "rad") if k in row else None for k in ("latitude_south", "longitude_west"))
+    return Flyby(
+        row["name"], enceladus(), quantity(row["altitude"], "m"), quantity(row["speed"], "m/s"), south, west,
+        row["date"], (noticed[0], noticed[1]) if noticed else None, row["source"],
+    )  # fmt: skip

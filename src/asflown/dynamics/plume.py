@@ -1,0 +1,160 @@
+"""Density of a plume that jets from a moon's surface (004 section VII, eqs 23 to 28).
+
+A jet stands radially on the surface.  ``tilt`` (delta) is its colatitude, positive on the side of closest approach;
+``offset`` (Delta) its distance from the plane of trajectory and spin axis.  SI with radians.
+
+Each formula is there as printed too (``variant='printed'``).  What is wrong in print:
+
+- eq 23: atan(p/q) for the angle fails while q < 0, the craft being north of the source (Cairo: until +10.9 s of E3);
+- Table 2: Damascus' offset by the printed formula is 146.2 km; the 0.40 km of the table need longitudes modulo 180 degrees;
+- eq 25: its constant is in kg/m3 km^1.9, not kg/m3/km^1.9;
+- eq 26: cut off at 1400 km while jets still blow, which makes steps: continued here;
+- eq 28: a mean square, whose quoted value has the unit of its root.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from ..kit.errors import BadInput, some_of
+from ..kit.quantities import quantity
+from .flyby import Flyby, tables
+
+VARIANTS, ANGLES = ("corrected", "printed"), ("plane", "space")
+#: Distances within which 004 applies eq 26. [m]
+NEAREST_M, FARTHEST_M = 50e3, 1400e3
+
+
+@dataclass(frozen=True)
+class Jet:
+    """One source: K [kg/m3] and K_theta [rad] of eq 26, and where it stands."""
+
+    name: str
+    density_kgm3: float
+    width_rad: float
+    tilt_rad: float
+    offset_m: float
+    latitude_south_rad: float
+    longitude_west_rad: float
+
+
+@cache
+def published_jets() -> tuple[Jet, ...]:
+    """Alexandria, Cairo and Damascus as E3 passed them (004 Tables 2 and 3)."""
+    return tuple(
+        Jet(
+            row["name"], quantity(row["density"], "kg/m3"), quantity(row["width"], "rad"), quantity(row["tilt"], "rad"),
+            quantity(row["offset"], "m"), quantity(row["latitude_south"], "rad"), quantity(row["longitude_west"], "rad"),
+        )
+        for row in tables()["jet"]
+    )  # fmt: skip
+
+
+def offset(flyby: Flyby, latitude_south_rad: float, longitude_west_rad: float, variant: str = "corrected") -> float:
+    """Delta = R_E cos(latitude) |longitude - longitude of the trajectory|, distance from the flyby's plane. [m]   004 Table 2
+
+    The plane meets the moon in two meridians: the nearer one counts.  ``printed`` takes that of closest approach always."""
+    apart = abs(longitude_west_rad - _longitude(flyby))
+    if _check(variant, VARIANTS, "variant") == "corrected":
+        apart = abs((apart + np.pi / 2) % np.pi - np.pi / 2)
+    return float(flyby.moon.radius_m * np.cos(latitude_south_rad) * apart)
+
+
+def tilt(flyby: Flyby, latitude_south_rad: float, longitude_west_rad: float) -> float:
+    """delta = colatitude, positive on the side of closest approach. [rad]   004 Table 2"""
+    side = np.sign(np.cos(longitude_west_rad - _longitude(flyby))) or 1.0
+    return float(side * (np.pi / 2 - latitude_south_rad))
+
+
+def as_passed(jet: Jet, flyby: Flyby) -> Jet:
+    """The same source with the tilt and offset it has for another flyby."""
+    place = jet.latitude_south_rad, jet.longitude_west_rad
+    return replace(jet, tilt_rad=tilt(flyby, *place), offset_m=offset(flyby, *place))
+
+
+def seen_from(jet: Jet, flyby: Flyby, time_s, *, variant: str = "corrected", angle: str = "plane"):
+    """Distance r [m] of the craft from a jet's source and angle theta [rad] from its axis.   004 eq 23
+
+    ``angle``: of the projection into the flyby's plane, as in the paper, or in ``space``, the offset counted: it has no cusp
+    where the craft crosses the axis."""
+    _check(variant, VARIANTS, "variant")
+    p, q = np.moveaxis(
+        flyby.in_plane(time_s) - flyby.moon.radius_m * np.array([np.sin(jet.tilt_rad), np.cos(jet.tilt_rad)]), -1, 0
+    )
+    r = np.sqrt(p**2 + q**2 + jet.offset_m**2)
+    if _check(angle, ANGLES, "angle") == "space":
+        along = p * np.sin(jet.tilt_rad) + q * np.cos(jet.tilt_rad)
+        return r, np.arccos(np.clip(along / np.maximum(r, 1e-9), -1, 1))
+    if variant == "printed":
+        with np.errstate(divide="ignore"):
+            return r, np.abs(np.arctan(p / q) - jet.tilt_rad)
+    off = np.arctan2(p, q) - jet.tilt_rad
+    return r, np.abs((off + np.pi) % (2 * np.pi) - np.pi)
+
+
+def jet_density(
+    jet: Jet, flyby: Flyby, time_s, *, power: float = 1, falloff: float = 1.5, variant: str = "corrected", angle: str = "plane"
+) -> np.ndarray:  # fmt: skip
+    """rho = K (R_E / r)^falloff exp(-(theta / K_theta)^power), of one jet. [kg/m3]   004 eq 26
+
+    The power in print can be read as 1 (default) or, as in eq 24, 2.  Within 50 km the distance counts as 50 km, where the
+    paper's formula is not to be used and ``printed`` gives nothing; so it does beyond 1400 km."""
+    r, theta = seen_from(jet, flyby, time_s, variant=variant, angle=angle)
+    rho = (flyby.moon.radius_m / np.maximum(r, NEAREST_M)) ** falloff * np.exp(-((theta / jet.width_rad) ** power))
+    if variant == "printed":
+        rho = np.where((r >= NEAREST_M) & (r <= FARTHEST_M), rho, 0.0)
+    return jet.density_kgm3 * rho
+
+
+def plume_density(jets: Sequence[Jet], flyby: Flyby, time_s, **how) -> np.ndarray:
+    """Sum of all jets. [kg/m3]   004 eq 27.  ``how``: see ``jet_density``."""
+    return np.sum([jet_density(j, flyby, time_s, **how) for j in jets], axis=0)
+
+
+def plume_around_pole(n0, radius_m, distance_m, angle_rad, width_rad, depletion_m) -> np.ndarray:
+    """n = n0 (R_E/R)^2 exp(-(Theta/H_Theta)^2) exp(-(R - R_E)/H_d), in the unit of n0.   004 eq 24 (its reference 21)
+
+    R from the moon's centre, Theta from the plume's."""
+    R = np.asarray(distance_m, float)
+    return (
+        n0
+        * (radius_m / R) ** 2
+        * np.exp(-((np.asarray(angle_rad, float) / width_rad) ** 2))
+        * np.exp(-(R - radius_m) / depletion_m)
+    )
+
+
+def density_by_altitude(altitude_m, constant=3.911e-8, start_m=20e3, epsilon=0.1) -> np.ndarray:
+    """rho = C (h + h0)^(-2 + epsilon) of one jet, C in kg/m3 at 1 km: kg/m3 km^1.9. [kg/m3]   004 eq 25 (its reference 27)
+
+    With the constants in print one jet has a tenth of E3's peak at its altitude: they are ten, or C is ten times larger."""
+    return constant * ((np.asarray(altitude_m, float) + start_m) / 1e3) ** (-2 + epsilon)
+
+
+def model_error(time_s, model_kgm3, reconstructed_kgm3, variant: str = "corrected") -> float:
+    """Root of the mean square over time of model less reconstructed. [kg/m3]   004 eq 28
+
+    ``printed``: without the root [kg2/m6]; the 0.435e-12 kg/m3 in print is of the root."""
+    t = np.asarray(time_s, float)
+    off = np.asarray(model_kgm3, float) - np.asarray(reconstructed_kgm3, float)
+    square = float(np.trapezoid(off**2, t) / (t[-1] - t[0]))
+    return square if _check(variant, VARIANTS, "variant") == "printed" else float(np.sqrt(square))
+
+
+def _longitude(flyby: Flyby) -> float:
+    if flyby.longitude_west_rad is None:
+        raise BadInput(
+            f"the longitude of {flyby.name}'s closest approach is not known, and a jet's offset needs it",
+            remedy="Use a flyby of Table 1 (E3, E4, E9).",
+        )
+    return flyby.longitude_west_rad
+
+
+def _check(value: str, allowed, what: str) -> str:
+    if value not in allowed:
+        raise BadInput(f"{what} {value!r} is not known", remedy=f"Choose one of: {some_of(allowed)}.")
+    return value

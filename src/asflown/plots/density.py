@@ -1,0 +1,98 @@
+"""Density along a flyby, with both its errors and the peaks that others found, and the jets that make it."""
+
+from __future__ import annotations
+
+import textwrap
+
+import numpy as np
+
+from ..dynamics.plume import jet_density
+from ..estimate.density_result import DensityResult
+from ..estimate.jets_result import JetsResult
+from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, new_figure, save
+
+_SHOWN_S = (-60.0, 180.0)  # where a plume is met
+_SCALE = 1e12
+
+
+def draw_density(result: DensityResult, ax):
+    """Density over time from closest approach; dark band: shape, light: shape and scale together (95 %).  Returns ax."""
+    t, rho = result.time_s, _SCALE * result.density_kgm3
+    for sigma, strength, label in (
+        (result.sigma_kgm3, 0.15, "with the scale, 95 %"),
+        (result.sigma_shape_kgm3, 0.3, "shape, 95 %"),
+    ):
+        if sigma is not None:
+            half = 1.96 * _SCALE * sigma
+            ax.fill_between(t, rho - half, rho + half, color=BLUE, alpha=strength, linewidth=0, label=label)
+    ax.plot(t, rho, color=BLUE, linewidth=1.4, label=f"{result.method}, {result.variant}")
+    ax.axhline(0, color=GREY, linewidth=0.6)
+    ax.axvline(0, color=GREY, linewidth=0.6, linestyle=":")
+    ax.set_ylabel("density [10⁻¹² kg/m³]")
+    return ax
+
+
+def draw_published_peaks(result: DensityResult, ax):
+    """Peaks of 004 Table 4 for the same flyby, with what is published of their error.  Returns ax."""
+    for beside, color, mark in zip(result.beside, (ORANGE, RED), "sD", strict=False):
+        p = beside.published
+        middle = _SCALE * float(np.mean(p.density_kgm3))
+        half = _SCALE * (p.sigma_kgm3 or 0.5 * (p.density_kgm3[1] - p.density_kgm3[0]))
+        ax.errorbar(
+            p.time_s, middle, half, fmt=mark, color=color, markersize=5, capsize=3, label=f"{p.instrument}, published"
+        )
+    return ax
+
+
+def draw_bound(result: DensityResult, ax):
+    """What torques left out may feign at most.  Returns ax."""
+    ax.plot(
+        result.time_s, _SCALE * result.bound_kgm3, color=GREY, linewidth=1.0, linestyle="--", label="left out, at most"
+    )
+    return ax
+
+
+def draw_jets(result: JetsResult, ax):
+    """Density of the jets together and of each, as in 004 Figures 11 and 12.  Returns ax."""
+    d = result.density
+    ax.plot(d.time_s, _SCALE * result.model_kgm3, color=RED, linewidth=1.4, label="jets together")
+    for source, color in zip(result.sources, (GREEN, ORANGE, PURPLE), strict=False):
+        rho = jet_density(source.jet, d.flyby, d.time_s, power=result.power, angle=result.angle)
+        known = "" if source.density_known else " (not identified)"
+        ax.plot(d.time_s, _SCALE * rho, color=color, linewidth=1.0, label=source.jet.name + known)
+    return ax
+
+
+def save_density_figure(result: DensityResult, path) -> None:
+    """Density, bound and published peaks; altitude along the top, doubts beneath."""
+    figure, (ax,) = new_figure(1, height=4.4)
+    draw_density(result, ax)
+    draw_bound(result, ax)
+    draw_published_peaks(result, ax)
+    _finish(figure, ax, result, f"Density met by {result.craft}, {result.flyby.name}", result.doubts, path)
+
+
+def save_jets_figure(result: JetsResult, path) -> None:
+    """The jets' density over the one reconstructed; altitude along the top, doubts beneath."""
+    figure, (ax,) = new_figure(1, height=4.4)
+    draw_density(result.density, ax)
+    draw_jets(result, ax)
+    d = result.density
+    _finish(figure, ax, d, f"Jets met by {d.craft}, {d.flyby.name}: power {result.power:g}", result.doubts, path)
+
+
+def _finish(figure, ax, result: DensityResult, title: str, doubts, path) -> None:
+    low, high = max(_SHOWN_S[0], result.time_s[0]), min(_SHOWN_S[1], result.time_s[-1])
+    if high > low:
+        ax.set_xlim(low, high)
+        ticks = [v for v in ax.get_xticks() if low <= v <= high]
+        top = ax.secondary_xaxis("top")
+        top.set_xticks(ticks, [f"{result.flyby.altitude(v) / 1e3:.0f}" for v in ticks])
+        top.set_xlabel("altitude [km]")
+    ax.legend(frameon=False, fontsize=8)
+    ax.set_title(title, loc="left", fontsize=11)
+    ax.set_xlabel(f"time from closest approach, {result.closest_approach} [s]")
+    if doubts:
+        text = "\n".join(textwrap.fill("DOUBT " + d, 125) for d in doubts[:4])
+        figure.supxlabel(text, fontsize=6.5, color=RED, x=0.02, ha="left")
+    save(figure, path)

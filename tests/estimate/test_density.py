@@ -1,0 +1,216 @@
+"""Density of a flyby: laws on what is made of a torque, recovery on simulated flybys E3, and what it refuses."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from asflown.craft.load import load_craft
+from asflown.dynamics.environment import gravity_gradient
+from asflown.dynamics.flyby import flyby_called
+from asflown.estimate.density import density
+from asflown.kit.errors import BadInput
+from asflown.sim.fly import fly
+from asflown.telemetry.tables import write_table
+from cli.program import complaint, run
+
+CASSINI = load_craft("cassini")
+E3 = flyby_called("E3")
+EPOCH, CLOSEST, CLOSEST_S = "2008-03-12T19:03:12", "2008-03-12T19:06:12", 180.0
+SCALE = 0.5 * 2.1 * 14410**2 * 18.401 * 0.853  # N m per kg/m3
+FLIGHT, UP = (0, 1, 0), (1, 0, 0)
+
+
+@cache
+def flown(seed=3, exponent=2, **more):
+    plume = {"shape": "plume", "closest_approach": f"{CLOSEST_S} s", "exponent": exponent}
+    return fly("quiet", craft=CASSINI, epoch=EPOCH, duration="480 s", seed=seed, torques=[plume], **more)
+
+
+def true_density(f, r):
+    return -np.interp(r.time_s + CLOSEST_S, f.truth.time_s, f.truth.torque_Nm[:, 2]) / SCALE
+
+
+# ---- published ----------------------------------------------------------------------------------------------
+
+
+def test_published_errors_add_up():
+    """004 section VI: 5.9 % of what is known of the drag, 5 % of the torque, 7.73 % together."""
+    r = density(flown().telemetry, CASSINI, "E3", CLOSEST, variant="printed")
+    assert r.scale == 0.059 and r.peak.sigma_kgm3 / r.peak.density_kgm3 == pytest.approx(0.0773, abs=5e-5)
+    assert r.torque_per_density == -3.422e9 and (r.method, r.variant) == ("transfer", "printed")
+    assert r.gravity_gradient_Nm is None and r.peak.sigma_time_s is None
+
+
+# ---- laws ---------------------------------------------------------------------------------------------------
+
+
+def test_law_density_is_torque_over_drag_and_both_errors_stay_apart():
+    r = density(flown().telemetry, CASSINI, "E3", CLOSEST, method="momentum")
+    assert r.torque_per_density == pytest.approx(-SCALE)
+    assert r.density_kgm3 == pytest.approx(-r.torque_Nm / SCALE)
+    doubled = density(flown().telemetry, CASSINI, "E3", CLOSEST_S, method="momentum", area_m2=2 * 18.401)
+    assert doubled.peak.density_kgm3 == pytest.approx(r.peak.density_kgm3 / 2)
+    assert doubled.scale == r.scale == pytest.approx(0.059)
+    assert r.sigma_kgm3 == pytest.approx(np.hypot(r.sigma_shape_kgm3, 0.059 * r.density_kgm3))
+    assert r.peak.altitude_m == pytest.approx(E3.altitude(r.peak.time_s))
+
+
+def test_law_gravity_gradient_is_taken_off_where_the_attitude_is_told():
+    f = flown()
+    bounded = density(f.telemetry, CASSINI, "E3", CLOSEST, method="momentum")
+    told = density(f.telemetry, CASSINI, "E3", CLOSEST, method="momentum", velocity_B=FLIGHT, up_B=UP)
+    I_B = CASSINI.at(f.telemetry.epoch_ns).inertia_kgm2
+    expected = gravity_gradient(I_B, E3.position(told.time_s, UP, FLIGHT), E3.moon.mu_m3_s2)[:, 2]
+    assert told.gravity_gradient_Nm == pytest.approx(expected)
+    assert (bounded.density_kgm3 - told.density_kgm3) * told.torque_per_density == pytest.approx(expected, abs=1e-15)
+    assert np.abs(expected).max() > 2e-4  # N m
+    # what is left out is then sunlight, generators and magnetism only
+    assert (told.bound_kgm3 * SCALE).max() == pytest.approx(2e-6 + 1.83e-6 + 0.4928e-6, rel=1e-3)
+    assert (bounded.bound_kgm3 * SCALE).max() == pytest.approx(1339e-6, abs=2e-6)
+    assert any("not taken off" in d for d in bounded.doubts) and not any("not taken off" in d for d in told.doubts)
+
+
+def test_law_the_arms_sign_is_that_of_the_largest_excursion():
+    plume = {"shape": "plume", "closest_approach": f"{CLOSEST_S} s", "sign": 1}
+    f = fly("quiet", craft=CASSINI, epoch=EPOCH, duration="480 s", seed=3, torques=[plume])
+    r = density(f.telemetry, CASSINI, "E3", CLOSEST, method="momentum")
+    assert r.torque_per_density > 0 and r.peak.density_kgm3 > 5e-12
+
+
+# ---- recovery -----------------------------------------------------------------------------------------------
+
+
+def peaks_off(seeds, exponent):
+    """Relative errors of the peak, pulls of shape and time, and lateness [s]."""
+    found = []
+    for seed in seeds:
+        f = flown(seed, exponent)
+        at_s, torque, _ = f.truth.peaks[0]
+        p = density(f.telemetry, CASSINI, "E3", CLOSEST).peak
+        off, late = p.density_kgm3 + torque / SCALE, p.time_s + CLOSEST_S - at_s
+        found.append((off * SCALE / -torque, off / p.sigma_shape_kgm3, late, late / p.sigma_time_s))
+    return np.array(found).T
+
+
+@pytest.mark.parametrize(("exponent", "late_s"), [(1, -3.0), (2, -0.4)])
+def test_recovery_of_the_peak(exponent, late_s):
+    """A cusp (exponent 1) is rounded on its steeper side: its time comes out early, and the result says so."""
+    off, pulls, late, _ = peaks_off(range(5), exponent)
+    assert np.abs(off.mean()) < 0.035 and np.abs(off).max() < 0.10
+    assert np.abs(pulls).max() < 2.5
+    assert late.mean() == pytest.approx(late_s, abs=2.2)  # s: 3 sigma of five with 1.6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("exponent", "late_s"), [(1, -3.0), (2, -0.4)])
+def test_recovery_of_the_peak_over_many_flybys(exponent, late_s):
+    off, pulls, late, time_pulls = peaks_off(range(100, 200), exponent)
+    assert np.abs(off.mean()) < 0.03
+    assert np.mean(np.abs(pulls) < 1) > 0.60
+    assert late.mean() == pytest.approx(late_s, abs=0.8)
+    assert np.sqrt(np.mean(time_pulls**2)) < 1.7
+
+
+def test_recovery_along_the_flyby():
+    f = flown()
+    r = density(f.telemetry, CASSINI, "E3", CLOSEST)
+    off = r.density_kgm3 - true_density(f, r)
+    assert np.sqrt(np.mean(off**2)) < 0.02 * r.peak.density_kgm3
+    assert np.std(off / r.sigma_shape_kgm3) < 2.0
+    assert r.noticed_s[0] == pytest.approx(20, abs=8) and r.noticed_s[1] > 90
+
+
+def test_no_gas_is_said_to_be_none():
+    f = fly("quiet", craft=CASSINI, epoch=EPOCH, duration="480 s", seed=1)
+    r = density(f.telemetry, CASSINI, "E3", CLOSEST, method="momentum")
+    assert r.noticed_s is None and any("no gas is seen" in d for d in r.doubts)
+
+
+# ---- what it says and refuses -------------------------------------------------------------------------------
+
+
+def test_peaks_published_for_the_same_flyby_stand_beside():
+    r = density(flown().telemetry, CASSINI, "E3", CLOSEST)
+    aacs, inms = r.beside
+    assert inms.ratio == pytest.approx(r.peak.density_kgm3 / 1.8e-12)
+    both = np.hypot(r.peak.sigma_kgm3 / r.peak.density_kgm3, 0.2 / 1.8)
+    assert inms.sigma_ratio == pytest.approx(inms.ratio * both) and aacs.sigma_ratio is None
+    assert inms.later_s == r.peak.time_s - 50
+
+
+def test_doubts():
+    tlm = flown().telemetry
+    other = density(tlm, CASSINI, "E4", CLOSEST, method="momentum")
+    assert any("2008-08-11" in d for d in other.doubts) and any("not at E4" in d for d in other.doubts)
+    own = density(tlm, CASSINI, "E4", CLOSEST, method="momentum", area_m2=20.0, arm_m=0.7)
+    assert not any("not at E4" in d for d in own.doubts)
+    bare = CASSINI.aerodynamics.model_copy(update={"scale_sigma": None})
+    r = density(tlm, CASSINI.model_copy(update={"aerodynamics": bare}), "E3", CLOSEST, method="momentum")
+    assert r.scale == pytest.approx(0.1 / 2.1) and any("count as exact" in d for d in r.doubts)
+
+
+@pytest.mark.parametrize(("how", "words"), [
+    ({"closest_approach": "2008-03-12T21:00:00"}, "not in this record"),
+    ({"closest_approach": "900"}, "too few"),
+    ({"flyby": "E21"}, "E3, E4, E5, E9"),
+    ({"axis": "w"}, "x, y, z"),
+    ({"axis": "x"}, "about z only"),
+    ({"velocity_B": FLIGHT}, "only one is given"),
+    ({"velocity_B": FLIGHT, "up_B": FLIGHT}, "perpendicular"),
+    ({"variant": "printed", "flyby": "E4"}, "that of E3"),
+    ({"variant": "best"}, "corrected, printed"),
+    ({"method": "magic"}, "fused"),
+    ({"area_m2": -1.0}, "positive"),
+])  # fmt: skip
+def test_what_it_refuses(how, words):
+    given = {"flyby": "E3", "closest_approach": CLOSEST, "method": "momentum"} | how
+    with pytest.raises(BadInput, match=words):
+        density(flown().telemetry, CASSINI, **given)
+
+
+def test_it_refuses_a_craft_whose_drag_or_inertia_is_not_known():
+    with pytest.raises(BadInput, match="drag of"):
+        density(flown().telemetry, CASSINI.model_copy(update={"aerodynamics": None}), "E3", CLOSEST)
+    unknown = CASSINI.model_copy(update={"mass_properties": ()})
+    with pytest.raises(BadInput, match="inertia"):
+        density(flown().telemetry, unknown, "E3", CLOSEST, method="momentum")
+
+
+# ---- the verb -----------------------------------------------------------------------------------------------
+
+
+def test_the_verb(tmp_path):
+    path = tmp_path / "e3.csv"
+    write_table(flown().telemetry, path)
+    words = ("density", path, "--flyby", "E3", "--closest-approach", CLOSEST, "--method", "momentum")
+    done = run(*words, "--json", "--plot", tmp_path / "d.svg")
+    assert done.code == 0 and done.err == f"wrote {tmp_path / 'd.svg'}\n"
+    record = done.record
+    assert {
+        "flyby",
+        "time_s",
+        "density_kgm3",
+        "sigma_shape_kgm3",
+        "sigma_scale_fraction",
+        "peak",
+        "doubts",
+        "provenance",
+    } <= set(record)
+    assert {"density_kgm3", "time_s", "altitude_m", "sigma_time_s"} <= set(record["peak"])
+    assert (record["command"], record["flyby"]) == ("density", "E3") and record["peak"]["sigma_time_s"] is None
+    assert len(record["time_s"]) == len(record["density_kgm3"]) == len(record["altitude_m"])
+    assert record["time_s"][0] == pytest.approx(-CLOSEST_S, abs=4) and len(record["published"]) == 2
+    assert (tmp_path / "d.svg").read_text().startswith("<?xml")
+    text = run(*words, "--velocity", "0,1,0", "--up", "1,0,0")
+    assert text.code == 0 and "gravity gradient taken off" in text.out and "INMS" in text.out
+
+
+@pytest.mark.parametrize("words", [
+    ["--area", "18"], ["--arm", "1 s"], ["--velocity", "0,1"], ["--up", "1,0,0"], ["--plot", "x.bmp"], ["--flyby", "T5"],
+    ["--closest-approach", "noon"], ["--craft", "iss"],
+])  # fmt: skip
+def test_the_verb_refuses(words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_table(flown().telemetry, tmp_path / "t.csv")
+    complaint("density", "t.csv", "--flyby", "E3", "--closest-approach", CLOSEST, *words)
