@@ -24,7 +24,7 @@ test: setup                ## everything but the slow campaigns
 	$(BIN)/python -m pytest -n 2
 
 slow: setup                ## the campaigns that .ci/run adds
-	$(BIN)/python -m pytest -m slow
+	$(BIN)/python -m pytest -n 2 -m slow
 
 bench: setup               ## timings beside the peers, as ratios
 	$(BIN)/python benchmarks/torque_speed.py

@@ -22,7 +22,7 @@ MAY_IMPORT = {
     "plots": {"kit", "craft", "telemetry", "maneuvers", "dynamics", "estimate", "trends"},
     "trends": {"kit", "craft", "telemetry", "dynamics", "estimate"},
     "campaigns": {"kit", "craft", "telemetry", "dynamics", "sim", "estimate", "trends"},
-    "report": {"kit", "maneuvers", "estimate", "trends", "plots"},
+    "report": {"kit", "estimate", "trends", "plots"},
     "cli": {
         "kit",
         "craft",

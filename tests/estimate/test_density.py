@@ -93,6 +93,7 @@ def peaks_off(seeds, exponent):
     return np.array(found).T
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("exponent", "late_s"), [(1, -3.0), (2, -0.4)])
 def test_recovery_of_the_peak(exponent, late_s):
     """A cusp (exponent 1) is rounded on its steeper side: its time comes out early, and the result says so."""

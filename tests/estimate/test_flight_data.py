@@ -142,6 +142,7 @@ def test_iss_torque_about_x_follows_the_gravity_gradient():
     assert abs(np.mean(result.torque_Nm[known, 0] - expected)) < 1.5  # N m, of 3
 
 
+@pytest.mark.slow
 def test_recovery_iss_fused_torque_about_x_follows_the_gravity_gradient():
     """Of 40 minutes, with nothing to smooth over given: the commanded torque keeps its scale."""
     import iss_stored_momentum as study

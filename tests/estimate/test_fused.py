@@ -162,6 +162,7 @@ def test_a_sample_at_a_jump_has_a_noise_of_its_own():
     assert np.array_equal(model.H[data.row[19]], model.H[2])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("prior", ["matern", "edges"])
 def test_law_near_the_bound_for_torques_drawn_from_the_prior(prior):
     """Within 1.15 of the posterior Cramer-Rao bound of the known linear Gaussian model, levels fitted, not told."""
@@ -214,6 +215,7 @@ def test_recovery_fused_on_another_simulator(run):
     assert np.mean((low[:, 1] <= true) & (true <= high[:, 1])) > 0.8
 
 
+@pytest.mark.slow
 def test_recovery_impulse_has_a_sigma_that_holds():
     """000's first figure of merit, minute 1 to 2.35, without differentiating."""
     pulls = []
@@ -376,6 +378,7 @@ def test_a_long_record_is_smoothed_and_says_so():
         fused(flight.telemetry, prior="edges")
 
 
+@pytest.mark.slow
 def test_a_peak_has_a_sigma_that_holds():
     pulls = []
     for seed in range(4):
@@ -399,6 +402,7 @@ def test_the_default_falls_back_to_momentum_where_fused_cannot_be_used():
     assert disturbance_torque(tlm, CASSINI, axis="y", variant="printed").method == "momentum"
 
 
+@pytest.mark.slow
 def test_recovery_in_a_slew_the_actuators_are_taken_as_measured():
     flight = fly("slews", seed=1)
     r = fused(flight.telemetry, axis="all")

@@ -86,6 +86,7 @@ def test_recovery_without_noise(exponent):
     assert r.momentum_rms_Nms < 2e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("exponent", "at_s"), [(1, 39.3), (2, 33.1)])
 def test_recovery_of_jets_and_of_the_peaks_time(exponent, at_s):
     """The time that smoothing moves by 3 s at a cusp is that of the jets' own curve."""

@@ -166,6 +166,7 @@ def test_the_coarsest_channel_widens_the_window_of_all():
 # ---- recovery --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("profile", "rms_mNm"), [(1, 1.45), (2, 1.7)])
 def test_recovery_corrected_momentum_beats_printed_and_its_band_mostly_holds(profile, rms_mNm):
     """Nominal noise, asflown's own simulator.  The band holds noise only: corners cost coverage."""
