@@ -7,7 +7,19 @@ from pathlib import Path
 import typer
 
 from .flyby_options import AREA, ARM, AXIS, CLOSEST, FLYBY, METHOD, UP, VELOCITY, drag_from
-from .options import CHANNELS, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP, craft_from, hashes, telemetry_from
+from .options import (
+    CHANNELS,
+    CRAFT,
+    EXCLUDE,
+    INERTIA,
+    JSON,
+    START,
+    STOP,
+    check_picture,
+    craft_from,
+    hashes,
+    telemetry_from,
+)
 from .output import print_doubts, print_json, provenance, say
 
 
@@ -35,13 +47,8 @@ def density(
 ) -> None:
     """Density of the gas that a craft meets in a flyby, from the torque it exerts."""
     from asflown.estimate.density import density as density_of
-    from asflown.kit.files import check_place
 
-    if plot is not None:
-        from asflown.plots.figure import picture_kind
-
-        check_place(plot)
-        picture_kind(plot)
+    check_picture(plot)
     ship = craft_from(craft, inertia, None)
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
     drag = drag_from(axis, method, area, arm, velocity, up)

@@ -6,7 +6,19 @@ from pathlib import Path
 
 import typer
 
-from .options import CHANNELS, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP, craft_from, hashes, telemetry_from
+from .options import (
+    CHANNELS,
+    CRAFT,
+    EXCLUDE,
+    INERTIA,
+    JSON,
+    START,
+    STOP,
+    check_picture,
+    craft_from,
+    hashes,
+    telemetry_from,
+)
 from .output import print_doubts, print_json, provenance, say
 
 
@@ -37,14 +49,9 @@ def external_torque(
 ) -> None:
     """The steady external torque on the craft, from the momentum it gains."""
     from asflown.estimate.external_torque import external_torque as steady_torque
-    from asflown.kit.files import check_place
     from asflown.kit.quantities import numbers
 
-    if plot is not None:
-        from asflown.plots.figure import picture_kind
-
-        check_place(plot)
-        picture_kind(plot)
+    check_picture(plot)
     ship = craft_from(craft, inertia, None)
     turn = None if turn_rate is None else numbers(turn_rate, "rad/s", 3)
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)

@@ -8,8 +8,22 @@ import typer
 
 from . import inertia_history, inertia_plan
 from .groups import FitUnlessNamed
-from .options import CHANNELS, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP, craft_from, hashes, telemetry_from
-from .output import print_doubts, print_json, progress, provenance, say
+from .options import (
+    CHANNELS,
+    CRAFT,
+    EXCLUDE,
+    INERTIA,
+    JSON,
+    KEEP_AS,
+    KEEP_IN,
+    START,
+    STOP,
+    check_picture,
+    craft_from,
+    hashes,
+    telemetry_from,
+)
+from .output import keep, print_doubts, print_json, progress, provenance, say
 
 app = typer.Typer(
     cls=FitUnlessNamed,
@@ -42,21 +56,16 @@ def fit(
     channels: Path = CHANNELS,
     exclude: Path = EXCLUDE,
     inertia: str = INERTIA,
-    store: str = typer.Option(None, "--store", help="Keep the result in a trend store: a path (SQLite) or a URL."),
-    name: str = typer.Option(None, "--id", help="Its name in the store; the date unless given."),
+    store: str = KEEP_IN,
+    name: str = KEEP_AS,
     plot: Path = typer.Option(None, "--plot", help="Draw rates, momentum and what is left (SVG, PNG or PDF)."),
     json: bool = JSON,
 ) -> None:
     """Inertia tensor as flown and external torque, from reaction-wheel slews."""
     from asflown.estimate.inertia import inertia_tensor
-    from asflown.kit.files import check_place
     from asflown.kit.quantities import quantity
 
-    if plot is not None:
-        from asflown.plots.figure import picture_kind
-
-        check_place(plot)
-        picture_kind(plot)
+    check_picture(plot)
     ship = craft_from(craft, inertia, None)
     scales = quantity(wheel_error, ""), quantity(rate_error, "")
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
@@ -68,11 +77,8 @@ def fit(
     origin = provenance(inputs | hashes(craft), options)
     if store is not None:
         from asflown.trends.inertia_entry import inertia_entry
-        from asflown.trends.store import TrendStore
 
-        with TrendStore.open(store) as trends:
-            kept = trends.add(inertia_entry(result, telemetry, ship, name, origin))[0]
-        say(f"kept as {kept.event}, revision {kept.revision}")
+        keep(store, inertia_entry(result, telemetry, ship, name, origin))
     if plot is not None:
         from asflown.plots.inertia import save_inertia_figure
 

@@ -6,7 +6,20 @@ from pathlib import Path
 
 import typer
 
-from .options import CHANNELS, CM, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP, craft_from, hashes, telemetry_from
+from .options import (
+    CHANNELS,
+    CM,
+    CRAFT,
+    EXCLUDE,
+    INERTIA,
+    JSON,
+    START,
+    STOP,
+    check_picture,
+    craft_from,
+    hashes,
+    telemetry_from,
+)
 from .output import print_doubts, print_json, provenance, say
 
 
@@ -39,14 +52,9 @@ def leak(
 ) -> None:
     """Leaking and weak thrusters, from momentum that orders do not explain.  Exit code 3 on an alarm."""
     from asflown.estimate.leak import LeakWatch
-    from asflown.kit.files import check_place
     from asflown.kit.quantities import quantity
 
-    if plot is not None:
-        from asflown.plots.figure import picture_kind
-
-        check_place(plot)
-        picture_kind(plot)
+    check_picture(plot)
     ship = craft_from(craft, inertia, cm)
     watch = LeakWatch(
         ship,

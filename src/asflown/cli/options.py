@@ -15,6 +15,8 @@ CHANNELS = typer.Option(None, "--channels", help="Channel dictionary (TOML) for 
 EXCLUDE = typer.Option(None, "--exclude", help="Spans not to be used: CSV of start, stop, channel, reason.")
 START = typer.Option(None, "--start", help="Start of the window: seconds from the epoch, or UTC.")
 STOP = typer.Option(None, "--stop", help="End of the window: seconds from the epoch, or UTC.")
+KEEP_IN = typer.Option(None, "--store", help="Keep the result in a trend store: a path (SQLite) or a URL.")
+KEEP_AS = typer.Option(None, "--id", help="Its name in the store; the date unless given.")
 JSON = typer.Option(False, "--json", help="One JSON object on standard output.")
 
 
@@ -53,3 +55,13 @@ def telemetry_from(file: Path, channels, exclude, start, stop, craft):
 
     whole = load_telemetry(file, channels=channels, exclude=exclude, craft=craft)
     return whole.between(start, stop), {whole.source: whole.sha256} | hashes(channels, exclude)
+
+
+def check_picture(place: Path | None) -> None:
+    """Before the work: whether a picture can be drawn there (None: none is asked for)."""
+    if place is not None:
+        from asflown.kit.files import check_place
+        from asflown.plots.figure import picture_kind
+
+        check_place(place)
+        picture_kind(place)

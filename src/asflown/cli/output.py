@@ -36,6 +36,15 @@ def say(text: str = "") -> None:
     print(text, file=sys.stderr, flush=True)
 
 
+def keep(store: str, entry) -> None:
+    """An entry into a trend store, and what it is kept as."""
+    from asflown.trends.store import TrendStore
+
+    with TrendStore.open(store) as trends:
+        kept = trends.add(entry)[0]
+    say(f"kept as {kept.event}, revision {kept.revision}")
+
+
 def progress():
     """``say`` for a person who waits; None where standard error is kept, so that an error stands there alone."""
     return say if sys.stderr.isatty() else None

@@ -6,8 +6,23 @@ from pathlib import Path
 
 import typer
 
-from .options import CHANNELS, CM, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP, craft_from, hashes, telemetry_from
-from .output import print_doubts, print_json, provenance, say
+from .options import (
+    CHANNELS,
+    CM,
+    CRAFT,
+    EXCLUDE,
+    INERTIA,
+    JSON,
+    KEEP_AS,
+    KEEP_IN,
+    START,
+    STOP,
+    check_picture,
+    craft_from,
+    hashes,
+    telemetry_from,
+)
+from .output import keep, print_doubts, print_json, provenance, say
 
 
 def thrust(
@@ -34,8 +49,8 @@ def thrust(
     channels: Path = CHANNELS,
     exclude: Path = EXCLUDE,
     inertia: str = INERTIA,
-    store: str = typer.Option(None, "--store", help="Keep the result in a trend store: a path (SQLite) or a URL."),
-    name: str = typer.Option(None, "--id", help="Its name in the store; the date unless given."),
+    store: str = KEEP_IN,
+    name: str = KEEP_AS,
     plot: Path = typer.Option(
         None, "--plot", help="Draw wheels, on-times and thrusts (SVG, PNG or PDF by its suffix)."
     ),
@@ -44,14 +59,9 @@ def thrust(
     """Thrust of every thruster, fall time and centre of mass, from wheel biasing, run-downs and burns."""
     from asflown.estimate.thrust import thrust as thrust_of
     from asflown.estimate.thrust_priors import priors_for
-    from asflown.kit.files import check_place
     from asflown.kit.quantities import numbers, quantity
 
-    if plot is not None:
-        from asflown.plots.figure import picture_kind
-
-        check_place(plot)
-        picture_kind(plot)
+    check_picture(plot)
     ship = craft_from(craft, inertia, cm)
     priors = priors_for(
         ship,
@@ -70,8 +80,9 @@ def thrust(
                "inertia": inertia}  # fmt: skip
     origin = provenance(inputs | hashes(craft), options)
     if store is not None:
-        kept = _kept(store, name, result, telemetry[0], ship, origin)
-        say(f"kept as {kept.event}, revision {kept.revision}")
+        from asflown.trends.thrust_entry import thrust_entry
+
+        keep(store, thrust_entry(result, telemetry[0], ship, name, origin))
     if plot is not None:
         from asflown.plots.thrust import save_thrust_figure
 
@@ -82,12 +93,3 @@ def thrust(
         return
     print(result)
     print_doubts(result.doubts)
-
-
-def _kept(store: str, name: str | None, result, telemetry, ship, origin):
-    from asflown.trends.store import TrendStore
-    from asflown.trends.thrust_entry import thrust_entry
-
-    entry = thrust_entry(result, telemetry, ship, name, origin)
-    with TrendStore.open(store) as trends:
-        return trends.add(entry)[0]

@@ -6,7 +6,20 @@ from pathlib import Path
 
 import typer
 
-from .options import CHANNELS, CM, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP, craft_from, hashes, telemetry_from
+from .options import (
+    CHANNELS,
+    CM,
+    CRAFT,
+    EXCLUDE,
+    INERTIA,
+    JSON,
+    START,
+    STOP,
+    check_picture,
+    craft_from,
+    hashes,
+    telemetry_from,
+)
 from .output import print_doubts, print_json, provenance, say
 
 
@@ -52,8 +65,11 @@ def torque(
 
     from asflown.estimate.compare import compare_torques
     from asflown.estimate.torque import disturbance_torque
+    from asflown.kit.files import check_place
 
-    _check_places(out, plot)
+    if out is not None:
+        check_place(out)
+    check_picture(plot)
     ship = craft_from(craft, inertia, cm)
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
     mechanism = None if moving == "none" else moving
@@ -143,19 +159,6 @@ def _with_impulse(result, text: str):
         )
     found = [(span[0], span[1], "xyz"[j], *result.impulse(span[0], span[1], "xyz"[j])) for j in result.axes]
     return replace(result, impulses=tuple(found))
-
-
-def _check_places(out, plot) -> None:
-    """Where nothing can be written, say so before the work."""
-    from asflown.kit.files import check_place
-
-    for place in (out, plot):
-        if place is not None:
-            check_place(place)
-    if plot is not None:
-        from asflown.plots.figure import picture_kind
-
-        picture_kind(plot)
 
 
 def _others(telemetry, ship, result, mechanism):

@@ -6,8 +6,21 @@ from pathlib import Path
 
 import typer
 
-from .options import CHANNELS, CRAFT, EXCLUDE, JSON, START, STOP, craft_from, hashes, telemetry_from
-from .output import print_doubts, print_json, provenance, say
+from .options import (
+    CHANNELS,
+    CRAFT,
+    EXCLUDE,
+    JSON,
+    KEEP_AS,
+    KEEP_IN,
+    START,
+    STOP,
+    check_picture,
+    craft_from,
+    hashes,
+    telemetry_from,
+)
+from .output import keep, print_doubts, print_json, provenance, say
 
 
 def wheels(
@@ -21,21 +34,16 @@ def wheels(
     stop: str = STOP,
     channels: Path = CHANNELS,
     exclude: Path = EXCLUDE,
-    store: str = typer.Option(None, "--store", help="Keep the result in a trend store: a path (SQLite) or a URL."),
-    name: str = typer.Option(None, "--id", help="Its name in the store; the date unless given."),
+    store: str = KEEP_IN,
+    name: str = KEEP_AS,
     plot: Path = typer.Option(None, "--plot", help="Draw rates and drag (SVG, PNG or PDF by its suffix)."),
     json: bool = JSON,
 ) -> None:
     """Bearing drag of every wheel, drag spikes, dwell at low speed, zero crossings and revolutions."""
     from asflown.estimate.wheel_drag import wheel_drag
-    from asflown.kit.files import check_place
     from asflown.kit.quantities import quantity
 
-    if plot is not None:
-        from asflown.plots.figure import picture_kind
-
-        check_place(plot)
-        picture_kind(plot)
+    check_picture(plot)
     ship = craft_from(craft, None, None)
     low = quantity(low_speed, "rad/s")
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
@@ -44,8 +52,9 @@ def wheels(
     options = {"craft": craft, "run_down": run_down, "low_speed": low_speed, "start": start, "stop": stop}
     origin = provenance(inputs | hashes(craft), options)
     if store is not None:
-        kept = _kept(store, name, result, telemetry, ship, origin)
-        say(f"kept as {kept.event}, revision {kept.revision}")
+        from asflown.trends.wheel_entry import wheel_entry
+
+        keep(store, wheel_entry(result, telemetry, ship, name, origin))
     if plot is not None:
         from asflown.plots.wheels import save_wheels_figure
 
@@ -56,12 +65,3 @@ def wheels(
         return
     print(result)
     print_doubts(result.doubts)
-
-
-def _kept(store: str, name: str | None, result, telemetry, ship, origin):
-    from asflown.trends.store import TrendStore
-    from asflown.trends.wheel_entry import wheel_entry
-
-    entry = wheel_entry(result, telemetry, ship, name, origin)
-    with TrendStore.open(store) as trends:
-        return trends.add(entry)[0]
