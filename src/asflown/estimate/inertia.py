@@ -16,9 +16,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..craft.model import Craft
-from ..dynamics.rigid_body import ELEMENTS, elements_of, nearest_possible, tensor_of
+from ..dynamics.rigid_body import ELEMENTS, elements_of, momentum_regressor, nearest_possible, tensor_of
 from ..kit.errors import BadInput
-from ..kit.rotations import rotation
+from ..kit.rotations import rates_between, rotation
 from ..telemetry.telemetry import Telemetry
 from .excitation import Excitation, excitation
 from .inertia_momentum import all_axes, by_axis, generalized, rows_of
@@ -157,13 +157,12 @@ def _with_steps(subject: Subject, fit: SlewFit, asked: dict, doubts: list[str]) 
 def _momentum_residual(fit: SlewFit):
     """Residual momentum at the wheels' instants: time (N,), inertial axes (N, 3), arc (N,)."""
     m, model = fit.record.momentum, fit.model
-    rows = np.flatnonzero(model.kind == WHEEL)
-    samples = model.source[rows]
-    time_s, index = np.unique(m.time_s[samples], return_inverse=True)
-    total = np.zeros((len(time_s), 3))
-    np.add.at(total, index, m.direction[samples] * fit.residual[rows, None])
+    rows = model.kind == WHEEL
+    left = np.empty(len(m.time_s))
+    left[model.source[rows]] = fit.residual[rows]
+    time_s, total, index = m.vectors(left)
     arc = np.zeros(len(time_s), int)
-    arc[index] = m.arc[samples]
+    arc[index] = m.arc
     motion = fit.motion.at(time_s + fit.beta[fit.layout.skew_wheels])
     return time_s, rotation(motion.q_NB).apply(total), arc
 
@@ -171,9 +170,7 @@ def _momentum_residual(fit: SlewFit):
 def _evidence(fit: SlewFit, zero: float) -> Evidence:
     time_s, residual, _ = _momentum_residual(fit)
     moved = fit.motion.moved(fit.smoothed.mean).at(time_s + fit.beta[fit.layout.skew_wheels])
-    m = fit.record.momentum
-    held, index = np.zeros((len(time_s), 3)), np.searchsorted(time_s, m.time_s)
-    np.add.at(held, index, m.direction * m.value_Nms[:, None])
+    _, held, _ = fit.record.momentum.vectors(fit.record.momentum.value_Nms)
     return Evidence(zero + time_s, moved.omega_B, held, residual, np.ones(len(time_s), bool))
 
 
@@ -307,8 +304,6 @@ def _unit(momentum: MomentumSamples) -> np.ndarray:
 
 def _plain_elements(rows) -> np.ndarray:
     """A rough tensor to start from: momentum free, ordinary least squares."""
-    from ..dynamics.rigid_body import momentum_regressor
-
     S = momentum_regressor(rows.motion.omega_B)
     R = rotation(rows.motion.q_NB).as_matrix()
     X = np.concatenate([-S, np.swapaxes(R, 1, 2)], axis=2).reshape(-1, 9)
@@ -325,9 +320,8 @@ def _turning(record: SlewRecord, steady: bool = True) -> tuple[Excitation, list[
     if record.has_rates:
         times, omega = record.common_rates()
     else:
-        r = rotation(record.attitude.q_NB)
         times = record.attitude.time_s[1:]
-        omega = (r[:-1].inv() * r[1:]).as_rotvec() / np.diff(record.attitude.time_s)[:, None]
+        omega = rates_between(record.attitude.time_s, record.attitude.q_NB)[1]
     inside = np.zeros(len(times), bool)
     for a, b in record.arcs:
         inside |= (times >= a) & (times < b)

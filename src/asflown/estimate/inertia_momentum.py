@@ -53,15 +53,13 @@ class Solved:
 def rows_of(record: SlewRecord) -> Rows:
     """Raises BadInput where the wheels are not read together."""
     m = record.momentum
-    times, index = np.unique(m.time_s, return_inverse=True)
+    times, h, index = m.vectors(m.value_Nms)  # components along orthonormal directions, where all three are read
     whole = np.bincount(index, minlength=len(times)) == 3
     if whole.sum() < 0.5 * len(times):
         raise BadInput(
             "the wheels are read at different instants, and this method needs their momentum at common ones",
             remedy="Use --method consistent.",
         )
-    h = np.zeros((len(times), 3))
-    np.add.at(h, index, m.direction * m.value_Nms[:, None])  # components along orthonormal directions
     arc = np.zeros(len(times), int)
     arc[index] = m.arc
     times, h, arc = times[whole], h[whole], arc[whole]

@@ -72,14 +72,12 @@ def _residual(record: SlewRecord):
     """What plain least squares leaves over: time (N,), momentum (N, 3), inertial axes, and arc (N,)."""
     layout, m = Layout.of(record), record.momentum
     beta, _ = plain_fit(record, layout, np.zeros(layout.size), 0.0)
-    times, index = np.unique(m.time_s, return_inverse=True)
+    times, held, index = m.vectors(m.value_Nms)
     motion = first_motion(record, times)
     r = rotation(motion.q_NB)
     arc = np.zeros(len(times), int)
     arc[index] = m.arc
     starts = beta[6 : 6 + 3 * layout.arcs].reshape(layout.arcs, 3)
-    held = np.zeros((len(times), 3))
-    np.add.at(held, index, m.direction * m.value_Nms[:, None])
     return times, r.apply(held + motion.omega_B @ tensor_of(beta[layout.TENSOR])) - starts[arc], arc
 
 
@@ -131,9 +129,7 @@ def _others(record: SlewRecord, slews: list[Slew]) -> Iterator[tuple[str, SlewRe
 def _read_as(record: SlewRecord, axes: np.ndarray, after: float | None) -> SlewRecord:
     """The same readings, the wheels' momentum along other axes (3, 3)."""
     m = record.momentum
-    times, index = np.unique(m.time_s, return_inverse=True)
-    h = np.zeros((len(times), 3))
-    np.add.at(h, index, m.direction * m.value_Nms[:, None])
+    _, h, index = m.vectors(m.value_Nms)
     other = h @ np.linalg.inv(record.axes) @ axes
     late = np.ones(len(index), bool) if after is None else m.time_s > after
     value = np.where(late, np.sum(m.direction * other[index], axis=1), m.value_Nms)

@@ -15,7 +15,7 @@ from scipy import optimize
 from ..dynamics.rigid_body import momentum_regressor
 from ..kit.errors import BadInput
 from ..kit.regressed import Disturbances, Filtered, Steps, run, smooth
-from ..kit.rotations import rotation
+from ..kit.rotations import rates_between, rotation
 from .slew_model import (
     Layout,
     Levels,
@@ -61,22 +61,18 @@ class SlewFit:
 
     record: SlewRecord
     layout: Layout
-    frame: str
     beta: np.ndarray
     moved: np.ndarray  # by how much in the last round
     covariance: np.ndarray
-    information: np.ndarray  # of beta, from the data alone (p, p)
     by_scale: np.ndarray  # beta per unit error of the wheels' spin inertia, and of the rates' scale
     levels: Levels
     motion: Motion
     model: Linearized
     smoothed: Disturbances
-    filtered: Filtered
     kept: np.ndarray  # (M,) bool
     loosened: np.ndarray
     rounds: int
     converged: bool
-    log_likelihood: float
 
     @property
     def residual(self) -> np.ndarray:
@@ -85,11 +81,6 @@ class SlewFit:
         departure = self.smoothed.mean
         step = np.repeat(np.arange(len(z.start) - 1), np.diff(z.start))
         return z.y - z.Z[:, : self.layout.size] @ self.moved - np.sum(z.H * departure[step], axis=1)
-
-    @property
-    def whitened(self) -> np.ndarray:
-        """Innovations over their sigma, outliers left out."""
-        return (self.filtered.innovation[:, 0] / np.sqrt(self.filtered.variance))[self.kept]
 
 
 def fit_slews(record: SlewRecord, *, frame: str = "body", prior: tuple[np.ndarray, np.ndarray] | None = None,
@@ -131,18 +122,28 @@ def fit_slews(record: SlewRecord, *, frame: str = "body", prior: tuple[np.ndarra
         f = run(steps)
         delta, covariance, by_scale = solved(f, layout, weight, centre - beta)
         s = smooth(steps, f, np.append(delta, [0.0, 0.0]))
-        log_likelihood = f.log_likelihood(np.append(delta, [0.0, 0.0]))
         moved = np.max(np.abs(delta) / np.sqrt(np.diag(covariance)))
         settled = moved < 0.5 * _SETTLED and (levels is not None or _near(before, fitted))
         if settled or rounds == _MOST_ROUNDS:
             converged = bool(moved < _SETTLED)
             break
         motion, beta = motion.moved(s.mean), beta + delta
-    information = f.information[1 : layout.size + 1, 1 : layout.size + 1]
     return SlewFit(
-        record, layout, frame, beta + delta, delta, covariance, information, by_scale, fitted, motion, model, s, f, kept, loosened,
-        rounds, converged, log_likelihood,
-    )  # fmt: skip
+        record,
+        layout,
+        beta + delta,
+        delta,
+        covariance,
+        by_scale,
+        fitted,
+        motion,
+        model,
+        s,
+        kept,
+        loosened,
+        rounds,
+        converged,
+    )
 
 
 def _priors(layout: Layout, prior, skew_s: float):
@@ -337,9 +338,8 @@ def _shifted(record: SlewRecord, layout: Layout, beta) -> SlewRecord:
 
 def _rates_late(record: SlewRecord) -> float:
     """By how much the rates' time stamps must be moved for them to match the attitude's, roughly. [s]"""
-    tq, r = record.attitude.time_s, rotation(record.attitude.q_NB)
     tg, w = record.common_rates()
-    mid, mean = tq[:-1] + np.diff(tq) / 2, (r[:-1].inv() * r[1:]).as_rotvec() / np.diff(tq)[:, None]
+    mid, mean = rates_between(record.attitude.time_s, record.attitude.q_NB)
     misfit = {
         s: sum(np.sum((np.interp(mid, tg + s, w[:, j]) - mean[:, j]) ** 2) for j in range(3)) for s in _SKEWS_TRIED
     }

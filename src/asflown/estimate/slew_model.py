@@ -24,7 +24,7 @@ from scipy.spatial.transform import Rotation
 from ..dynamics.momentum import grown_by
 from ..dynamics.rigid_body import momentum_regressor, tensor_of
 from ..kit.regressed import Steps
-from ..kit.rotations import quaternion, rotation, turned_by
+from ..kit.rotations import quaternion, rates_between, rotation, turned_by
 from .slew_record import SlewRecord
 
 #: Instants closer than this are one. [s]
@@ -115,11 +115,10 @@ def first_motion(record: SlewRecord, time_s: np.ndarray) -> Motion:
     if record.has_attitude:
         tq = record.attitude.time_s
         r = rotation(record.attitude.q_NB)
-        step = (r[:-1].inv() * r[1:]).as_rotvec() / np.diff(tq)[:, None]
+        mid, step = rates_between(tq, record.attitude.q_NB)
         k = np.clip(np.searchsorted(tq, time_s + _SAME_S) - 1, 0, len(step) - 1)
         q = quaternion(r[k] * Rotation.from_rotvec(step[k] * (time_s - tq[k])[:, None]))
         if not record.has_rates:
-            mid = tq[:-1] + np.diff(tq) / 2
             omega = np.stack([np.interp(time_s, mid, step[:, j]) for j in range(3)], axis=1)
     else:
         q = quaternion(turned_by(time_s, omega))

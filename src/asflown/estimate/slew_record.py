@@ -47,6 +47,13 @@ class MomentumSamples:
     count: np.ndarray  # (M,)
     arc: np.ndarray  # (M,) int
 
+    def vectors(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Instants (N,), the sum of ``values`` (M,) along their directions at each (N, 3), and each sample's instant (M,)."""
+        times, index = np.unique(self.time_s, return_inverse=True)
+        total = np.zeros((len(times), 3))
+        np.add.at(total, index, self.direction * values[:, None])
+        return times, total, index
+
 
 @dataclass(frozen=True)
 class RateSamples:
