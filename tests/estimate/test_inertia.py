@@ -205,6 +205,16 @@ def test_trap_a_thruster_inside_a_slew_is_left_out_and_said():
         assert np.abs(pulls(result, kicked.inertia_kgm2)).max() < 4.5
 
 
+def test_trap_a_whiff_of_a_thruster_that_no_channel_tells_of_is_found():
+    """0.02 N m s of 15 that move: 2 % of conservation do not see it, and left in it moves Ixx by ten sigmas."""
+    kick = {"shape": "table", "axis": "x", "times": "800 800.5 801.5 802 s", "torques": "0 0.02 0.02 0 N m"}
+    kicked = fly("slews", seed=5, torques=[kick])
+    result = inertia_tensor(kicked.telemetry, CASSINI)
+    (said,) = [d for d in result.doubts if "momentum steps near" in d]
+    assert abs(float(said.split()[4]) - 801) <= 6 and result.settings["arcs"] == 2
+    assert np.abs(pulls(result, kicked.inertia_kgm2)).max() < 4
+
+
 def test_trap_a_gap_in_a_slew():
     cut = flight().telemetry.epoch_ns + NS * np.array([100, 250])
     gap = changed(flight().telemetry, "wheel_rate", lambda c: c.where((c.tai_ns < cut[0]) | (c.tai_ns > cut[1])))

@@ -25,8 +25,8 @@ from .inertia_momentum import all_axes, by_axis, generalized, rows_of
 from .inertia_prediction import compare_inertia, predicted_inertia
 from .inertia_result import Evidence, InertiaResult
 from .inertia_torque import balance, told
-from .slew_contradictions import MOST_STEPS, conserved, step_of_momentum
-from .slew_fit import SlewFit, first_levels, fit_slews
+from .slew_contradictions import MOST_STEPS, conserved
+from .slew_fit import SlewFit, first_levels, fit_slews, momentum_step
 from .slew_model import WHEEL
 from .slew_plan import prior_sigma
 from .slew_record import MomentumSamples, SlewRecord, slew_record
@@ -41,7 +41,7 @@ WHEEL_SCALE = 0.0024
 RATE_SCALE = 0.001
 
 #: A step of momentum is kept where it is this large, squared, in its own covariance.
-_STEP_KEPT = 60.0
+_STEP_KEPT = 40.0
 #: Time stamps apart by more than this are spoken of. [s]
 _LATE_S = 0.05
 #: Wheel readings that miss the fit by so many times their own scatter are not explained by it.
@@ -126,7 +126,7 @@ def _consistent(
         "rates_late_sigma_s": None if L.skew_rates is None else sigma[L.skew_rates],
         "wander_Nms_per_root_s": noise.wander or None,
         "rate_bias_rad_s": None if L.bias is None else fit.beta[L.bias],
-        "arcs": len(record.arcs), "left_out": int((~fit.kept).sum()), "rounds": fit.rounds, "converged": fit.converged,
+        "arcs": len(fit.record.arcs), "left_out": int((~fit.kept).sum()), "rounds": fit.rounds, "converged": fit.converged,
     }  # fmt: skip
     return InertiaResult(
         subject.craft.craft.name, "consistent", subject.telemetry.epoch_label, tensor_of(elements), _sigmas(fit.covariance[:6, :6]),
@@ -138,19 +138,11 @@ def _consistent(
 def _with_steps(subject: Subject, fit: SlewFit, asked: dict, doubts: list[str]) -> SlewFit:
     """The same fit with the momentum free to step where it plainly did: a thruster that no channel tells of."""
     for _ in range(0 if asked["wander"] else MOST_STEPS):
-        at = step_of_momentum(*_momentum_residual(fit))
-        if at is None:
-            return fit
-        other = fit_slews(fit.record.split_at(at), **asked)
-        arc = next(k for k, (a, _) in enumerate(other.record.arcs) if a == at)
-        both = [other.layout.momentum(arc), other.layout.momentum(arc - 1)]
-        gained = other.beta[both[0]] - other.beta[both[1]]
-        across = np.r_[both[0], both[1]]
-        signs = np.hstack([np.eye(3), -np.eye(3)])
-        if gained @ np.linalg.solve(signs @ other.covariance[np.ix_(across, across)] @ signs.T, gained) < _STEP_KEPT:
+        at, square = momentum_step(fit, asked["prior"])
+        if square < _STEP_KEPT:
             return fit
         doubts.append(_STEPPED.format(float(subject.telemetry.seconds(fit.record.start_ns)) + at))
-        fit = other
+        fit = fit_slews(fit.record.split_at(at), **asked)
     return fit
 
 

@@ -52,7 +52,7 @@ def conserved(record: SlewRecord, slews: list[Slew], source: str | None) -> tupl
     parted = record
     steps: list[float] = []
     while len(steps) < MOST_STEPS:
-        at = step_of_momentum(*_residual(parted))
+        at = _step_of_momentum(*_residual(parted))
         if at is None:
             break
         parted, steps = parted.split_at(at), [*steps, at]
@@ -81,7 +81,7 @@ def _residual(record: SlewRecord):
     return times, r.apply(held + motion.omega_B @ tensor_of(beta[layout.TENSOR])) - starts[arc], arc
 
 
-def step_of_momentum(time_s: np.ndarray, residual_N: np.ndarray, arc: np.ndarray) -> float | None:
+def _step_of_momentum(time_s: np.ndarray, residual_N: np.ndarray, arc: np.ndarray) -> float | None:
     """Where one step would take most off a residual momentum (N, 3), inertial axes, if it is plain. [s]"""
     quick = residual_N - ndimage.median_filter(residual_N, size=(31, 1), mode="nearest")  # without the step itself
     noise = np.sqrt(max(memory(column) for column in quick.T))  # neighbours that err alike are worth less

@@ -17,6 +17,7 @@ from ..kit.errors import BadInput
 from ..kit.regressed import Disturbances, Filtered, Steps, run, smooth
 from ..kit.rotations import rates_between, rotation
 from .slew_model import (
+    WHEEL,
     Layout,
     Levels,
     Linearized,
@@ -51,6 +52,9 @@ _TURNS = 8  # of the first round, in which the corners are found
 #: Factors by which one search may move a level; ten for the others.
 _REACH = {"jerk": 100.0, "kick": 100.0, "wander": 100.0, "coloured_s": 3.0}
 _LONGEST_S = 300.0
+#: Steps of momentum: looked for at instants this far apart [s], then between the best one's neighbours, so many at once;
+#: not nearer to an arc's ends than so many readings.
+_STEPS_APART_S, _STEPS_BETWEEN, _STEPS_AT_ONCE, _FEWEST_BESIDE = 20.0, 11, 20, 10
 #: Steps that the noise levels are fitted on, where there are more.
 _ENOUGH = 2000
 
@@ -144,6 +148,55 @@ def fit_slews(record: SlewRecord, *, frame: str = "body", prior: tuple[np.ndarra
         rounds,
         converged,
     )
+
+
+def momentum_step(fit: SlewFit, prior=None) -> tuple[float, float]:
+    """Where the total momentum most likely stepped, and that step's square in its own covariance (chi square of 3).
+
+    As if a step were let in at each of many instants in turn, motion and levels held: all in one filter pass, then again
+    between the neighbours of the best, down to the wheels' cadence.  Residuals would not show it: rates and coloured
+    attitude error give way first."""
+    away = _priors(fit.layout, prior, _SKEW_S)
+    momentum, cadence = fit.record.momentum, _cadence(fit.record)
+    best = 0.0, 0.0
+    for arc, (_, stop) in enumerate(fit.record.arcs):
+        times = np.unique(momentum.time_s[momentum.arc == arc])
+        if len(times) < 2 * _FEWEST_BESIDE:
+            continue
+        low, high = times[_FEWEST_BESIDE], min(times[-_FEWEST_BESIDE], stop)
+        tried = np.linspace(low, high, max(3, int(np.ceil((high - low) / _STEPS_APART_S))))
+        while True:
+            squares = _steps_told(fit, arc, tried, away)
+            k = int(np.argmax(squares))
+            spacing = tried[1] - tried[0]
+            best = max(best, (float(squares[k]), float(tried[k])))
+            if spacing <= cadence:
+                break
+            tried = np.linspace(max(tried[k] - spacing, low), min(tried[k] + spacing, high), _STEPS_BETWEEN)
+    return best[1], best[0]
+
+
+def _steps_told(fit: SlewFit, arc: int, at_s: np.ndarray, away) -> np.ndarray:
+    """Chi square of a step of an arc's momentum at each instant (K,), each alone."""
+    z, p, momentum = fit.model, fit.layout.size, fit.record.momentum
+    steps = z.at(fit.levels, fit.loosened, fit.kept)
+    wheels = np.flatnonzero(z.kind == WHEEL)
+    when = np.where(momentum.arc == arc, momentum.time_s, -np.inf)[z.source[wheels]]
+    squares = []
+    for group in np.array_split(at_s, np.ceil(len(at_s) / _STEPS_AT_ONCE)):
+        extra = np.zeros((len(z.y), 3 * len(group)))
+        extra[wheels] = (z.Z[wheels, fit.layout.momentum(arc)][:, None] * (when[:, None] >= group)[:, :, None]).reshape(
+            len(wheels), -1
+        )
+        f = run(replace(steps, Z=np.column_stack([z.Z[:, :p], extra])))
+        told = f.information
+        delta, _, slope = solved(f, fit.layout, away[0], away[1] - z.beta)
+        score = told[p + 1 :, 0] - told[p + 1 :, 1 : p + 1] @ delta
+        information = told[p + 1 :, p + 1 :] - told[p + 1 :, 1 : p + 1] @ slope
+        for k in range(len(group)):
+            own = slice(3 * k, 3 * k + 3)
+            squares.append(score[own] @ np.linalg.solve(information[own, own], score[own]))
+    return np.array(squares)
 
 
 def _priors(layout: Layout, prior, skew_s: float):

@@ -58,13 +58,12 @@ class Filtered:
 
 @dataclass(frozen=True)
 class Disturbances:
-    """Smoothed at one beta: states (N, n), their covariances (N, n, n), measurement errors (M,) over their R.
+    """Smoothed at one beta: states (N, n), measurement errors (M,) over their R.
 
     ``by_noise`` (M,), ``by_drive`` (N, J): slope of the log likelihood in the log of each variance;
     ``by_first``: its matrix of slopes in the first state's covariance."""
 
     mean: np.ndarray
-    covariances: np.ndarray
     error: np.ndarray
     by_noise: np.ndarray
     by_drive: np.ndarray
@@ -75,8 +74,8 @@ def run(steps: Steps) -> Filtered:
     """The forward pass."""
     given = np.column_stack([steps.y, steps.Z])
     return Filtered(*_forward(
-        _c(steps.A), _c(steps.b), _c(steps.driven), _i(steps.kind), _c(steps.scale), _i(steps.start), _c(steps.H),
-        _c(given), _c(steps.R), _c(steps.covariance),
+        _c(steps.A), _entries(steps.A[1:]), _c(steps.b), _c(steps.driven), _drives(steps.driven), _i(steps.kind), _c(steps.scale),
+        _i(steps.start), _c(steps.H), _c(given), _c(steps.R), _c(steps.covariance),
     ))  # fmt: skip
 
 
@@ -86,8 +85,8 @@ def smooth(steps: Steps, filtered: Filtered, beta: np.ndarray) -> Disturbances:
     e = filtered.innovation @ share
     mean = filtered.mean @ share
     return Disturbances(*_backward(
-        _c(steps.A), _c(steps.driven), _i(steps.kind), _c(steps.scale), _i(steps.start), _c(steps.H), _c(steps.R),
-        _c(e), filtered.variance, filtered.product, _c(mean), filtered.covariances,
+        _c(steps.A), _entries(steps.A[1:]), _c(steps.driven), _drives(steps.driven), _i(steps.kind), _c(steps.scale), _i(steps.start),
+        _c(steps.H), _c(steps.R), _c(e), filtered.variance, filtered.product, _c(mean), filtered.covariances,
     ))  # fmt: skip
 
 
@@ -99,51 +98,95 @@ def _i(x) -> np.ndarray:
     return np.ascontiguousarray(x, dtype=np.int64)
 
 
+def _entries(matrices: np.ndarray) -> np.ndarray:
+    """Row and column of every entry that is not zero in all of them (K, n, n): (E, 2).  Most are, in a chain of integrals."""
+    return _i(np.argwhere(np.any(matrices != 0, axis=0)))
+
+
+def _drives(driven: np.ndarray) -> np.ndarray:
+    """Drive, row and column of every entry of the drives that is not zero. (E, 3)"""
+    return _i(np.argwhere(np.any(driven != 0, axis=1)))
+
+
 @jit
-def _forward(A, b, driven, kind, scale, start, H, given, R, first):
+def _times(A, entries, x, out):
+    """out = A x."""
+    out[:] = 0.0
+    for e in range(len(entries)):
+        i, j = entries[e, 0], entries[e, 1]
+        a = A[i, j]
+        for c in range(x.shape[1]):
+            out[i, c] += a * x[j, c]
+
+
+@jit
+def _turned(A, entries, P, half, out):
+    """out = A P A^T of a symmetric P."""
+    _times(A, entries, P, half)
+    n = len(P)
+    out[:] = 0.0
+    for e in range(len(entries)):
+        i, j = entries[e, 0], entries[e, 1]
+        a = A[i, j]
+        for c in range(n):
+            out[i, c] += a * half[c, j]
+
+
+@jit
+def _forward(A, entries, b, driven, drives, kind, scale, start, H, given, R, first):
     N, n = len(kind), A.shape[1]
     M, columns = given.shape
     innovation, variance, product = np.empty((M, columns)), np.empty(M), np.empty((M, n))
     mean, covariances = np.empty((N, n, columns)), np.empty((N, n, n))
     x, P, left = np.zeros((n, columns)), first.copy(), np.empty(n)
+    moved, half, turned = np.empty((n, columns)), np.empty((n, n)), np.empty((n, n))
     for k in range(N):
         if k > 0:
-            x = A[k] @ x
-            P = A[k] @ P @ A[k].T
+            _times(A[k], entries, x, moved)
+            x[:] = moved
+            _turned(A[k], entries, P, half, turned)
+            P[:] = turned
             for i in range(n):
                 x[i, 0] += b[k, i]
-            for j in range(driven.shape[0]):
-                P += scale[k, j] * driven[j, kind[k]]
+            for d in range(len(drives)):
+                j, i, c = drives[d, 0], drives[d, 1], drives[d, 2]
+                P[i, c] += scale[k, j] * driven[j, kind[k], i, c]
         mean[k] = x
         covariances[k] = P
         for m in range(start[k], start[k + 1]):
             s = R[m]
+            left[:] = 0.0
+            innovation[m] = given[m]
+            for c in range(n):
+                h = H[m, c]
+                if h != 0.0:
+                    for i in range(n):
+                        left[i] += h * P[c, i]
+                    for i in range(columns):
+                        innovation[m, i] -= h * x[c, i]
             for i in range(n):
-                total = 0.0
-                for c in range(n):
-                    total += P[i, c] * H[m, c]
-                product[m, i] = total
-            for i in range(n):
-                s += H[m, i] * product[m, i]
+                product[m, i] = left[i]
+                s += H[m, i] * left[i]
             variance[m] = s
-            for c in range(columns):
-                e = given[m, c]
-                for i in range(n):
-                    e -= H[m, i] * x[i, c]
-                innovation[m, c] = e
-                for i in range(n):
-                    x[i, c] += product[m, i] / s * e
+            for i in range(n):
+                gain = product[m, i] / s
+                for c in range(columns):
+                    x[i, c] += gain * innovation[m, c]
             # (1 - K h) P (1 - K h)^T + K R K^T: stays a covariance where the plain difference would round below zero
             for i in range(n):
+                gain = product[m, i] / s
                 for c in range(n):
-                    P[i, c] -= product[m, i] / s * product[m, c]
+                    P[i, c] -= gain * product[m, c]
+            left[:] = 0.0
+            for c in range(n):
+                h = H[m, c]
+                if h != 0.0:
+                    for i in range(n):
+                        left[i] += h * P[i, c]
             for i in range(n):
-                left[i] = 0.0
+                gain = product[m, i] * R[m] / s - left[i]
                 for c in range(n):
-                    left[i] += P[i, c] * H[m, c]
-            for i in range(n):
-                for c in range(n):
-                    P[i, c] += (product[m, i] * R[m] / s - left[i]) * product[m, c] / s
+                    P[i, c] += gain * product[m, c] / s
             for i in range(n):
                 for c in range(i):
                     P[i, c] = P[c, i] = 0.5 * (P[i, c] + P[c, i])
@@ -151,13 +194,15 @@ def _forward(A, b, driven, kind, scale, start, H, given, R, first):
 
 
 @jit
-def _backward(A, driven, kind, scale, start, H, R, e, variance, product, mean, covariances):
+def _backward(A, entries, driven, drives, kind, scale, start, H, R, e, variance, product, mean, covariances):
     N, n = len(kind), A.shape[1]
     error, by_noise = np.empty(len(R)), np.empty(len(R))
     by_drive = np.zeros(scale.shape)
     r, S = np.zeros(n), np.zeros((n, n))  # adjoint and its covariance
     gain, Sg = np.empty(n), np.empty(n)
-    smoothed, spread = np.empty((N, n)), np.empty((N, n, n))
+    before, half, turned = np.empty(n), np.empty((n, n)), np.empty((n, n))
+    smoothed = np.empty((N, n))
+    backward = np.ascontiguousarray(entries[:, ::-1])
     for k in range(N - 1, -1, -1):
         for m in range(start[k + 1] - 1, start[k] - 1, -1):
             s = variance[m]
@@ -174,26 +219,38 @@ def _backward(A, driven, kind, scale, start, H, R, e, variance, product, mean, c
                 weight += gain[i] * Sg[i]
             error[m] = pull  # E[v] = R pull, var v = R - R^2 weight
             by_noise[m] = 0.5 * R[m] * (pull**2 - weight)
+            # (1 - h g^T)^T S (1 - g h^T) + h h^T / s, one side after the other: multiplied out, it rounds below zero
             for i in range(n):
-                r[i] += H[m, i] * pull
-            for i in range(n):
-                for c in range(n):
-                    S[i, c] += weight * H[m, i] * H[m, c] - H[m, i] * Sg[c] - Sg[i] * H[m, c]
-        P = covariances[k]
-        smoothed[k] = mean[k] + P @ r
-        spread[k] = P - P @ S @ P
-        if k > 0:
-            for j in range(driven.shape[0]):
-                D = driven[j, kind[k]]
-                total = 0.0
-                for i in range(n):
+                h = H[m, i]
+                if h != 0.0:
+                    r[i] += h * pull
                     for c in range(n):
-                        total += D[i, c] * (r[i] * r[c] - S[i, c])
-                by_drive[k, j] = 0.5 * scale[k, j] * total
-            r = A[k].T @ r
-            S = A[k].T @ S @ A[k]
+                        S[i, c] -= h * Sg[c]
+            for i in range(n):
+                total = 0.0
+                for c in range(n):
+                    total += S[i, c] * gain[c]
+                Sg[i] = total
+            for i in range(n):
+                gained = H[m, i] / s - Sg[i]
+                for c in range(n):
+                    S[i, c] += gained * H[m, c]
+            for i in range(n):
+                for c in range(i):
+                    S[i, c] = S[c, i] = 0.5 * (S[i, c] + S[c, i])
+        smoothed[k] = mean[k] + covariances[k] @ r
+        if k > 0:
+            for d in range(len(drives)):
+                j, i, c = drives[d, 0], drives[d, 1], drives[d, 2]
+                by_drive[k, j] += 0.5 * scale[k, j] * driven[j, kind[k], i, c] * (r[i] * r[c] - S[i, c])
+            before[:] = 0.0
+            for d in range(len(entries)):
+                before[entries[d, 1]] += A[k, entries[d, 0], entries[d, 1]] * r[entries[d, 0]]
+            r[:] = before
+            _turned(A[k].T, backward, S, half, turned)
+            S[:] = turned
     by_first = np.empty((n, n))
     for i in range(n):
         for c in range(n):
             by_first[i, c] = 0.5 * (r[i] * r[c] - S[i, c])
-    return smoothed, spread, error, by_noise, by_drive, by_first
+    return smoothed, error, by_noise, by_drive, by_first
