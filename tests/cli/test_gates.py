@@ -64,7 +64,7 @@ def test_a_term_is_held_by_value_or_by_model(hold, key, value, rcs):
     "words",
     [
         ["--hold", "pointing"], ["--hold", "size=1 mm/s"], ["--hold", "pointing_fixed=1 mrad"], ["--hold", "pointing=1999"], ["--prior", "1999"],
-        ["--prior", "2012-1", "--prior-width", "0"], ["--without", "nobody"], ["--model", "biased"], ["--likelihood", "robust"], ["--engine", "ion"],
+        ["--prior", "2012-1", "--prior-width", "0"], ["--without", "nobody"], ["--model", "biased"], ["--likelihood", "huber"], ["--engine", "ion"],
     ],
 )  # fmt: skip
 def test_bad_options_are_complained_of(words, rcs):

@@ -16,8 +16,8 @@ from asflown.sim.maneuver_sets import A_BRANCH_END, MAIN_ENGINE_SET, RCS_SET, a_
 
 # recoveries are judged as the campaigns judge them
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
-from gates_power import power_said  # noqa: E402
-from gates_watch import story  # noqa: E402
+from gates_power import power_said
+from gates_watch import story
 
 RCS = past_model("rcs/2008-01")
 

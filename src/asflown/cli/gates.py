@@ -24,7 +24,7 @@ def fit(
     file: Path = FILE,
     engine: str = ENGINE,
     model: str = typer.Option("estimated-bias", "--model", help="estimated-bias, zero-mean or mean-aware."),
-    likelihood: str = typer.Option("additive", "--likelihood", help="additive, printed or unweighted."),
+    likelihood: str = typer.Option("additive", "--likelihood", help="additive, robust, printed or unweighted."),
     hold: list[str] = typer.Option(
         [],
         "--hold",
