@@ -10,7 +10,7 @@ from .gates_simulate import simulate
 from .gates_watch import predict, watch
 from .groups import FitUnlessNamed
 from .maneuver_options import AGAINST, ENGINE, FILE, PLOT_DIR, WITHOUT, held, maneuvers_from, past_named, removed_bias
-from .options import CRAFT, JSON, KEEP_AS, KEEP_IN, craft_from
+from .options import CRAFT, JSON, KEEP_AS, KEEP_IN, craft_from, hashes
 from .output import keep, print_doubts, print_json, provenance, say
 
 app = typer.Typer(
@@ -31,7 +31,9 @@ def fit(
         help='A term kept: "pointing_fixed=0 mm/s", "pointing_fixed=2000", "pointing=2000"; may be repeated.',
     ),
     prior: str = typer.Option(
-        None, "--prior", help="An earlier model whose sigmas are taken as a prior, as in 2008-01."
+        None,
+        "--prior",
+        help="An earlier model whose sigmas are taken as a prior: as in 2008-01, or an earlier fit's JSON.",
     ),
     prior_width: float = typer.Option(0.5, "--prior-width", help="Its width, in parts of each sigma."),
     against: str = AGAINST,
@@ -88,7 +90,7 @@ def fit(
     }  # fmt: skip
     record = {
         "command": "gates", **result.record(), **judged.record(), "patch": None if compared is None else compared.record(),
-        "doubts": doubts, "provenance": provenance({burns.source: burns.sha256}, options, seed),
+        "doubts": doubts, "provenance": provenance({burns.source: burns.sha256} | hashes(prior, against), options, seed),
     }  # fmt: skip
     if store is not None:
         from asflown.trends.gates_entry import gates_entry

@@ -168,13 +168,13 @@ def _doubts(m: Maneuvers, model: str, likelihood: str, parts: list[Part], prior:
     n = len(m)
     if n < FEWEST and prior is None:
         yield (
-            f"{n} burns cannot carry a Gates model of four sigmas and their biases (it takes {FEWEST}, and 20 before sigmas are known "
+            f"{n} burn{'s' if n > 1 else ''} cannot carry a Gates model of four sigmas and their biases (it takes {FEWEST}, and 20 before sigmas are known "
             "to a third): none is given, and the intervals say what can be said"
         )
     elif n < 20:
         yield f"{n} burns are few: sigmas are known to a third or worse"
     spread = float(m.dv_mps.max() / m.dv_mps.min())
-    if spread < _NARROW:
+    if n > 1 and spread < _NARROW:
         yield (
             f"all burns are of one size (largest over smallest {spread:.1f}): fixed and proportional parts are not told apart, "
             f"only their sum near {m.dv_mps.mean():.3g} m/s is known"
