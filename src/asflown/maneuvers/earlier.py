@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from ..kit.config import read_bytes
 from ..kit.errors import BadInput
@@ -23,18 +22,20 @@ def earlier_model(path: Path, engine: str) -> PastModel:
         record = json.loads(read_bytes(path, "record of a fit", remedy))
         if record["command"] != "gates":
             raise KeyError
-        whose, parts = record["engine"] or "", (record["magnitude"], record["pointing"])
-        values = [float(p[k]) for p, keys in zip(parts, (("fixed_mps", "proportional"), ("fixed_mps", "proportional_rad")), strict=True) for k in keys]  # fmt: skip
-        m, p = parts
-        biases: dict[str, Any] = {
-            "bias_fixed_mps": float(m["bias_fixed_mps"] or 0), "bias_proportional": float(m["bias_proportional"] or 0),
-            "pointing_bias_fixed_mps": _pair(p["bias_fixed_mps"]), "pointing_bias_proportional_rad": _pair(p["bias_proportional_rad"]),
-        }  # fmt: skip
+        whose, m, p = record["engine"] or "", record["magnitude"], record["pointing"]
         largest, counts, kept = (
             float(record["dv_mps"][1]),
             (int(record["count"]), len(record["excluded"])),
             record["model"],
         )
+        left = Gates(
+            float(m["fixed_mps"]), float(m["proportional"]), float(p["fixed_mps"]), float(p["proportional_rad"]),
+            valid_to_mps=largest, name=path.stem,
+        )  # fmt: skip
+        model = replace(
+            left, bias_fixed_mps=float(m["bias_fixed_mps"] or 0), bias_proportional=float(m["bias_proportional"] or 0),
+            pointing_bias_fixed_mps=_pair(p["bias_fixed_mps"]), pointing_bias_proportional_rad=_pair(p["bias_proportional_rad"]),
+        )  # fmt: skip
     except (ValueError, KeyError, TypeError, IndexError, UnicodeDecodeError):
         raise BadInput("it is no record of a fit that holds a whole model", file=path, remedy=remedy) from None
     if engine and whose and whose != engine and (engine_called(whose) or whose) != (engine_called(engine) or engine):
@@ -43,8 +44,6 @@ def earlier_model(path: Path, engine: str) -> PastModel:
             file=path,
             remedy="Name a model of the same engine.",
         )
-    left = Gates(*values, valid_to_mps=largest, name=path.stem)
-    model = replace(left, **biases)
     return PastModel(whose, (path.stem,), model, model if kept == "mean-aware" else left, count=counts)
 
 
