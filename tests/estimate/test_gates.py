@@ -223,7 +223,7 @@ def test_without_pointing_nothing_is_said_of_it(main_set):
 def test_bad_choices_are_refused(main_set):
     for words in (
         {"model": "biased"},
-        {"likelihood": "robust"},
+        {"likelihood": "huber"},
         {"hold": {"fixed": 1.0}},
         {"hold": {"magnitude_fixed": -1.0}},
         {"prior_width": 0.0},
