@@ -205,4 +205,4 @@ def test_what_is_no_earlier_fit_is_refused(rcs, tmp_path):
     assert "model of main-engine" in complaint("gates", rcs, "--against", model)
     model.write_text(json.dumps(record | {"pointing": dict.fromkeys(record["pointing"])}))
     assert "whole model" in complaint("gates", rcs, "--against", model)
-    complaint("gates", rcs, "--against", tmp_path / "nobody.json")
+    assert "no such record of a fit" in complaint("gates", rcs, "--against", tmp_path / "nobody.json")

@@ -5,7 +5,8 @@
 The scale of a t is less than the sigma of a normal set that it is fitted to; c is their ratio, so that s_i of clean sets is the
 sigma that it is by the other likelihoods.  The maximum is found by turns (Lange, Little and Taylor 1989, "Robust
 statistical modeling using the t distribution"): each burn's weight u = (4 + m) / (4 + q / c^2), from the squared distance
-q of its m errors, then the normal likelihood with errors and columns of the biases times sqrt(u) / c.  Four degrees of
+q of its m errors, then the normal likelihood with errors and columns of the biases times sqrt(u) / c.  The
+restricted likelihood's own term takes the weights as given, which leaves up to 0.01 of the log likelihood.  Four degrees of
 freedom are what they advise for small sets, where fitted ones are hardly told apart.
 """
 

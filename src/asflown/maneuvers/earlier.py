@@ -18,8 +18,9 @@ def earlier_model(path: Path, engine: str) -> PastModel:
     Its biases count as taken out of further burns, but for a fit that is mean-aware, as in `gates predict`.  Raises BadInput
     for what is no record of a fit, was made of too few burns to hold values, or is another engine's."""
     remedy = "Give what `asflown gates FILE --json` printed of maneuvers with magnitude and pointing errors."
+    data = read_bytes(path, "record of a fit", remedy)
     try:
-        record = json.loads(read_bytes(path, "record of a fit", remedy))
+        record = json.loads(data)
         if record["command"] != "gates":
             raise KeyError
         whose, m, p = record["engine"] or "", record["magnitude"], record["pointing"]
