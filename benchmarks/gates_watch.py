@@ -4,7 +4,9 @@
     python benchmarks/gates_watch.py --stories 100 --weaker 0,0.03
     python benchmarks/gates_watch.py --given         # judged by the model that flew them, not by the burns before
 
-Wanted: alarms of one burn in the share that the power of both burns gives, no alarm before in 95 %.
+Wanted: alarms of one burn in the share that the power says, no alarm before in 95 %.  The power of either burn: that of OTM-160,
+and where it raised no alarm that of OTM-169.  The model that judges OTM-169 then holds a burn that was weak already, which
+hides the second one: the threshold is the model's, the error is drawn by the model without it.
 """
 
 from __future__ import annotations
@@ -13,22 +15,29 @@ import argparse
 
 import numpy as np
 
-from asflown.estimate.gates_watch import alarm_chance, watch_maneuvers
+from asflown.estimate.gates_power import alarm_chance
+from asflown.estimate.gates_watch import watch_maneuvers
 from asflown.maneuvers.history import past_model
 from asflown.sim.maneuver_sets import A_BRANCH_END, a_branch
 
-SHOWN = ("OTM-160", "OTM-169")
+FIRST, SMALL, LAST = A_BRANCH_END
 
 
-def story(weaker: float, seed, given: bool = False) -> tuple[bool, bool, bool, bool, float]:
-    """An alarm before; at either burn by that burn alone; in any way; OTM-166 among them; the power beforehand."""
+def story(weaker: float, seed, given: bool = False) -> tuple[float, ...]:
+    """An alarm before OTM-160; by OTM-160 alone, its power; by either burn alone, the power; in any way; at OTM-166."""
     past = past_model("rcs/2008-01")
-    w = watch_maneuvers(a_branch(past.model, weaker, seed), against=past if given else None)
+    m = a_branch(past.model, weaker, seed)
+    w = watch_maneuvers(m, against=past if given else None)
     by = {b.id: b for b in w.burns}
-    missed = np.prod([1 - alarm_chance(by[i].foreseen, weaker * by[i].dv_mps, w.limit_p) for i in SHOWN])
+    alone = {i: "one burn" in by[i].alarms for i in (FIRST, LAST)}
+    said = alarm_chance(by[FIRST].foreseen, weaker * by[FIRST].dv_mps, w.limit_p)
+    either = said
+    if not alone[FIRST]:
+        sound = None if given else watch_maneuvers(m.without([FIRST, SMALL], "weak"), first=LAST).burns[0].foreseen
+        either += alarm_chance(by[LAST].foreseen, weaker * by[LAST].dv_mps, w.limit_p, drawn=sound)
     return (
-        any(b.alarms for b in w.burns if b.id not in A_BRANCH_END), any("one burn" in by[i].alarms for i in SHOWN),
-        any(by[i].alarms for i in SHOWN), bool(by["OTM-166"].alarms), float(1 - missed),
+        any(b.alarms for b in w.burns if b.id not in A_BRANCH_END), alone[FIRST], said, alone[FIRST] or alone[LAST], either,
+        bool(by[FIRST].alarms or by[LAST].alarms), bool(by[SMALL].alarms),
     )  # fmt: skip
 
 
@@ -38,12 +47,14 @@ def main() -> None:
     ask.add_argument("--weaker", default="0,0.02,0.03,0.05,0.1")
     ask.add_argument("--given", action="store_true")
     asked = ask.parse_args()
-    print("weaker  alarm before  one burn  power said  any alarm  OTM-166")
+    print("weaker  alarm before  OTM-160 alone   said  either alone   said  any alarm  OTM-166")
     for weaker in map(float, asked.weaker.split(",")):
-        early, one, some, small, power = np.mean(
-            [story(weaker, [2008, n], asked.given) for n in range(asked.stories)], axis=0
+        found = np.array([story(weaker, [2008, n], asked.given) for n in range(asked.stories)], float)
+        early, first, said, one, power, some, small = found.mean(axis=0)
+        print(
+            f"{weaker:6.2f}  {early:12.3f}  {first:13.3f}  {said:5.3f}  {one:12.3f}  {power:5.3f}  {some:9.3f}  {small:7.3f}",
+            flush=True,
         )
-        print(f"{weaker:6.2f}  {early:12.3f}  {one:8.3f}  {power:10.3f}  {some:9.3f}  {small:7.3f}")
 
 
 if __name__ == "__main__":

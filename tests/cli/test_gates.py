@@ -64,7 +64,7 @@ def test_a_term_is_held_by_value_or_by_model(hold, key, value, rcs):
     "words",
     [
         ["--hold", "pointing"], ["--hold", "size=1 mm/s"], ["--hold", "pointing_fixed=1 mrad"], ["--hold", "pointing=1999"], ["--prior", "1999"],
-        ["--prior", "2012-1", "--prior-width", "0"], ["--without", "nobody"], ["--model", "biased"], ["--likelihood", "robust"], ["--engine", "ion"],
+        ["--prior", "2012-1", "--prior-width", "0"], ["--without", "nobody"], ["--model", "biased"], ["--likelihood", "huber"], ["--engine", "ion"],
     ],
 )  # fmt: skip
 def test_bad_options_are_complained_of(words, rcs):
@@ -170,3 +170,39 @@ def test_simulate_writes_a_table_that_reads_back(tmp_path):
     for words in (["--by", "2012-1"], ["--weaker", "2"], ["--weaker", "1 mm/s"]):
         complaint("gates", "simulate", "--out", out, *words)
     complaint("gates", "simulate", "--out", tmp_path)
+
+
+def test_an_earlier_fit_is_a_model_like_those_of_the_history(rcs, tmp_path):
+    """Prior, judge, held term and source of predictions; biases stay only where the fit was mean-aware."""
+    fit, aware, plan = tmp_path / "epoch-1.json", tmp_path / "aware.json", tmp_path / "plan.csv"
+    fit.write_text(run("gates", rcs, "--json").out)
+    aware.write_text(run("gates", rcs, "--model", "mean-aware", "--json").out)
+    made = json.loads(fit.read_text())
+    record = run("gates", rcs, "--prior", fit, "--against", fit, "--hold", f"pointing_fixed={fit}", "--json").record
+    assert record["against"]["model"] == "epoch-1" and record["pointing"]["fixed_mps"] == made["pointing"]["fixed_mps"]
+    assert any("lean on epoch-1" in d for d in record["doubts"])
+    assert str(fit) in [i["file"] for i in record["provenance"]["inputs"]]
+    assert run("gates", "watch", rcs, "--against", aware, "--json").record["against"] == "aware"
+    plan.write_text("id,dv [m/s]\nnext,0.2\n")
+    for model, mean in (
+        (fit, 0.0),
+        (aware, made["magnitude"]["bias_fixed_mps"] + 0.2 * made["magnitude"]["bias_proportional"]),
+    ):
+        burn = run("gates", "predict", plan, "--by", model, "--json").record["burns"][0]
+        assert burn["mean_mps"][2] == pytest.approx(mean)
+        assert burn["sigma_magnitude_mps"] == pytest.approx(
+            (made["magnitude"]["fixed_mps"] ** 2 + (0.2 * made["magnitude"]["proportional"]) ** 2) ** 0.5, rel=1e-6
+        )
+
+
+def test_what_is_no_earlier_fit_is_refused(rcs, tmp_path):
+    model = tmp_path / "m.json"
+    for text in ("", "[]", "{}", '{"command": "torque"}', '{"command": "gates", "engine": "rcs"}'):
+        model.write_text(text)
+        assert "no record of a fit" in complaint("gates", rcs, "--prior", model)
+    record = run("gates", rcs, "--json").record
+    model.write_text(json.dumps(record | {"engine": "main-engine"}))
+    assert "model of main-engine" in complaint("gates", rcs, "--against", model)
+    model.write_text(json.dumps(record | {"pointing": dict.fromkeys(record["pointing"])}))
+    assert "whole model" in complaint("gates", rcs, "--against", model)
+    assert "no such record of a fit" in complaint("gates", rcs, "--against", tmp_path / "nobody.json")

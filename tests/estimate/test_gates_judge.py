@@ -33,18 +33,20 @@ def signed(below: int, count: int):
 @pytest.mark.parametrize(
     "below, count, percent, p",
     [
-        (37, 48, 77, 2.2e-4),
-        (21, 48, 44, 0.47),
-        (27, 48, 56, 0.47),
-        (26, 49, 53, 0.78),
-        (24, 49, 49, 1.0),
-        (25, 49, 51, 1.0),
+        (37, 48, 77.1, 2.2e-4),
+        (21, 48, 43.8, 0.47),
+        (27, 48, 56.2, 0.47),
+        (26, 49, 53.1, 0.78),
+        (24, 49, 49.0, 1.0),
+        (25, 49, 51.0, 1.0),
     ],
 )
 def test_published_counts_and_their_signs(below, count, percent, p):
     """002: underburns and overburns of both engines before and after the biases were taken out."""
     spread = judge_gates(fit_gates(signed(below, count)), draws=20).spreads[0]
-    assert (spread.below, round(100 * spread.below / spread.count)) == (below, percent)
+    assert spread.below == below and 100 * spread.below / spread.count == pytest.approx(
+        percent, abs=0.051
+    )  # as printed
     assert spread.sign_p == pytest.approx(p, rel=0.06) == sign_test(below, count)
 
 

@@ -196,21 +196,34 @@ def test_law_the_frame_turns_with_everything():
         assert np.allclose(a, b)
 
 
-def test_published_length_against_component():
-    """The difference of lengths and the component along Z differ by v theta^2 / 2: 0.015 mm/s for 10 mrad at 0.3 m/s."""
-    expected = np.array([[0.0, 0.0, 0.3]])
-    recon = expected + np.array([[0.3 * 0.010, 0, 0]])
+@pytest.mark.parametrize("dv, angle, apart_mm_s", [(0.3, 0.010, 0.015), (13.0, 0.001, 0.0065)])
+def test_published_length_against_component(dv, angle, apart_mm_s):
+    """The difference of lengths and the component along Z differ by v theta^2 / 2, of the RCS and of the main engine."""
+    expected = np.array([[0.0, 0.0, dv]])
+    recon = expected + np.array([[dv * angle, 0, 0]])
     error, *_ = resolved(recon, expected, np.zeros((1, 3, 3)), tvc_axes(expected, np.array([[1.0, 0, 0]])))
-    assert 1e3 * error[0] == pytest.approx(0.015, abs=0.0005)
+    assert 1e3 * error[0] == pytest.approx(apart_mm_s, rel=0.03)
 
 
 def test_published_signs_of_the_corrections():
-    """002 eq 7: with c = 0.985 the expected dV falls by 1.5 %, so that a -1.5 % bias goes, and a +1.5 % one doubles."""
+    """002 eqs 6 and 7: with c = 0.985 the expected dV falls by 1.5 %, so that a -1.5 % bias goes (RCS 2012), and a +1.5 % one doubles
+    (RCS 2006 as printed).  The main engine's +0.06 % of 2006 and -0.02 % of 2008 go likewise."""
     expected = np.array([[0, 0, 0.2]])
-    corrected = scale_corrected(expected, expected, [0.985])
-    for bias, left in ((-0.015, 0.0), (0.015, 0.03)):
+    for bias, c, left in ((-0.015, 0.985, 0.0), (0.015, 0.985, 0.03), (6e-4, 1.0006, 0.0), (-2e-4, 0.9998, 0.0)):
+        corrected = scale_corrected(expected, expected, [c])
         executed = 0.2 * (1 + bias)
         assert (executed - corrected[0, 2]) / 0.2 == pytest.approx(left, abs=1e-12)
+
+
+def test_published_deadband_of_otm_264(tmp_path):
+    """Deadband tightening of 1.5 mm/s in place of the 5 mm/s designed: 3.5 mm/s of underburn."""
+    path = tmp_path / "m.toml"
+    path.write_text(
+        '[[maneuver]]\nid = "OTM-264"\nburn_dv = "0 0 0.1 m/s"\ndeadband_dv = "0 0 5 mm/s"\nreconstructed_dv = "0 0 101.5 mm/s"\n'
+        'covariance = "0 0 0 0 0 0 mm2/s2"\ncraft_x = "1 0 0"\n'
+    )
+    m = load_maneuvers(path)
+    assert 1e3 * m.dv_mps[0] == pytest.approx(105.0) and 1e3 * m.magnitude_error_mps[0] == pytest.approx(-3.5)
 
 
 def test_a_bias_is_taken_out_once():

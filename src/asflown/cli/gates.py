@@ -10,8 +10,8 @@ from .gates_simulate import simulate
 from .gates_watch import predict, watch
 from .groups import FitUnlessNamed
 from .maneuver_options import AGAINST, ENGINE, FILE, PLOT_DIR, WITHOUT, held, maneuvers_from, past_named, removed_bias
-from .options import JSON
-from .output import print_doubts, print_json, provenance, say
+from .options import CRAFT, JSON, KEEP_AS, KEEP_IN, craft_from, hashes
+from .output import keep, print_doubts, print_json, provenance, say
 
 app = typer.Typer(
     cls=FitUnlessNamed, help="How well an engine executes its maneuvers: `asflown gates FILE` fits a Gates model and judges it.",
@@ -24,14 +24,16 @@ def fit(
     file: Path = FILE,
     engine: str = ENGINE,
     model: str = typer.Option("estimated-bias", "--model", help="estimated-bias, zero-mean or mean-aware."),
-    likelihood: str = typer.Option("additive", "--likelihood", help="additive, printed or unweighted."),
+    likelihood: str = typer.Option("additive", "--likelihood", help="additive, robust, printed or unweighted."),
     hold: list[str] = typer.Option(
         [],
         "--hold",
         help='A term kept: "pointing_fixed=0 mm/s", "pointing_fixed=2000", "pointing=2000"; may be repeated.',
     ),
     prior: str = typer.Option(
-        None, "--prior", help="An earlier model whose sigmas are taken as a prior, as in 2008-01."
+        None,
+        "--prior",
+        help="An earlier model whose sigmas are taken as a prior: as in 2008-01, or an earlier fit's JSON.",
     ),
     prior_width: float = typer.Option(0.5, "--prior-width", help="Its width, in parts of each sigma."),
     against: str = AGAINST,
@@ -44,6 +46,9 @@ def fit(
     ),
     bootstrap: int = typer.Option(0, "--bootstrap", min=0, max=100_000, help="Parametric refits."),
     seed: int = typer.Option(0, "--seed", min=0, help="Of bootstrap and envelopes."),
+    craft: str = CRAFT,
+    store: str = KEEP_IN,
+    name: str = KEEP_AS,
     plot_dir: Path = PLOT_DIR,
     report: Path = typer.Option(
         None, "--report", help="One page (HTML) with verdict, tables and figures; its JSON twin beside it."
@@ -81,12 +86,16 @@ def fit(
     doubts = [*result.doubts, *judged.doubts, *(compared.doubts if compared else ())]
     options = {
         "engine": engine, "model": model, "likelihood": likelihood, "hold": hold, "prior": prior, "prior_width": prior_width,
-        "against": against, "without": without, "patch": patch, "removed": removed, "bootstrap": bootstrap,
+        "against": against, "without": without, "patch": patch, "removed": removed, "bootstrap": bootstrap, "craft": craft,
     }  # fmt: skip
     record = {
         "command": "gates", **result.record(), **judged.record(), "patch": None if compared is None else compared.record(),
-        "doubts": doubts, "provenance": provenance({burns.source: burns.sha256}, options, seed),
+        "doubts": doubts, "provenance": provenance({burns.source: burns.sha256} | hashes(prior, against), options, seed),
     }  # fmt: skip
+    if store is not None:
+        from asflown.trends.gates_entry import gates_entry
+
+        keep(store, gates_entry(result, craft_from(craft, None, None), name, record["provenance"]))
     if plot_dir is not None:
         from asflown.plots.maneuvers import gates_figures, save_figures
 

@@ -17,6 +17,9 @@ def simulate(
     ),
     weaker: str = typer.Option(None, "--weaker", help='Share by which the last burns fall short, as in "3 %".'),
     last: int = typer.Option(3, "--last", min=1, help="How many do."),
+    start: str = typer.Option(
+        None, "--start", help="UTC of the first burn; the others follow every ten days. Without it there are no times."
+    ),
     seed: int = typer.Option(0, "--seed", min=0),
     out: Path = typer.Option(..., "--out", help="The table (CSV)."),
     json: bool = JSON,
@@ -29,6 +32,7 @@ def simulate(
     from asflown.kit.errors import BadInput
     from asflown.kit.files import check_place
     from asflown.kit.quantities import quantity
+    from asflown.kit.timeline import utc_to_tai_ns
     from asflown.maneuvers.history import RCS, past_model
     from asflown.maneuvers.write import write_maneuvers
     from asflown.sim.maneuver_sets import MAIN_ENGINE_SET, RCS_SET, execute
@@ -43,13 +47,16 @@ def simulate(
     short = np.zeros(burns.count)
     if weaker is not None:
         short[-last:] = share
-    write_maneuvers(execute(past.model, burns, seed, weaker=short), out)
+    made = execute(past.model, burns, seed, weaker=short)
+    if start is not None:
+        made = replace(made, tai_ns=utc_to_tai_ns(start) + 864_000_000_000_000 * np.arange(burns.count))
+    write_maneuvers(made, out)
     doubts = ["sizes are log-uniform and the orbit determination is assumed: no paper gives either"]
     if json:
         print_json({
             "command": "gates simulate", "out": str(out), "count": burns.count, "engine": burns.engine, "truth": past.model.record(),
             "weaker": share, "last": last if weaker else 0, "doubts": doubts,
-            "provenance": provenance({}, {"by": by, "count": count, "weaker": weaker, "last": last}, seed),
+            "provenance": provenance({}, {"by": by, "count": count, "weaker": weaker, "last": last, "start": start}, seed),
         })  # fmt: skip
         return
     say(f"wrote {out}")

@@ -41,7 +41,7 @@ def watch(
         print_json(
             {"command": "gates watch"}
             | result.record()
-            | {"provenance": provenance({burns.source: burns.sha256}, options)}
+            | {"provenance": provenance({burns.source: burns.sha256} | hashes(against), options)}
         )
     else:
         print(result)
@@ -52,7 +52,9 @@ def watch(
 
 def predict(
     plan: Path = typer.Argument(help="Burns to come: a table with id and dv, or expected_dv and craft_x."),
-    by: str = typer.Option(None, "--by", help="A model of the history, as in rcs/2012-1."),
+    by: str = typer.Option(
+        None, "--by", help="A model of the history, as in rcs/2012-1, or the JSON of an earlier fit."
+    ),
     past: Path = typer.Option(None, "--past", help="Executed maneuvers, to which a model is fitted."),
     engine: str = ENGINE,
     model: str = typer.Option("mean-aware", "--model", help="Of the fit: estimated-bias, zero-mean or mean-aware."),
@@ -95,7 +97,7 @@ def predict(
         say(f"wrote {out}")
     options = {"by": by, "past": past, "engine": engine, "model": model, "samples": samples}
     if json:
-        origin = provenance({burns.source: burns.sha256} | hashes(past), options, seed if samples else None)
+        origin = provenance({burns.source: burns.sha256} | hashes(past, by), options, seed if samples else None)
         print_json({"command": "gates predict"} | result.record() | {"provenance": origin})
         return
     print(result)

@@ -9,7 +9,11 @@ import typer
 FILE = typer.Argument(help="Maneuvers: CSV (plain or gzip), Parquet or TOML (docs/maneuvers.md).")
 ENGINE = typer.Option(None, "--engine", help="Which engine's, where the file holds several.")
 WITHOUT = typer.Option(None, "--without", help='Maneuvers left out, as in "OTM-264,OTM-265".')
-AGAINST = typer.Option(None, "--against", help="A model of the history to judge by, as in 2012-1 or rcs/2012-1.")
+AGAINST = typer.Option(
+    None,
+    "--against",
+    help="A model to judge by: of the history, as in 2012-1 or rcs/2012-1, or the JSON of an earlier fit.",
+)
 PLOT_DIR = typer.Option(None, "--plot-dir", help="Draw the figures into this folder (SVG).")
 
 
@@ -22,10 +26,13 @@ def maneuvers_from(file: Path, engine: str | None, without: str | None):
 
 
 def past_named(name: str | None, engine: str):
-    """A model of the history; ``engine``, as the file calls it, says whose where the name does not."""
+    """A model of the history, or of an earlier fit's JSON; ``engine``, as the file calls it, says whose where the name does not."""
+    from asflown.maneuvers.earlier import earlier_model
     from asflown.maneuvers.history import past_model
 
-    return None if name is None else past_model(name, engine)
+    if name is None:
+        return None
+    return earlier_model(Path(name), engine) if name.endswith(".json") else past_model(name, engine)
 
 
 def held(asked: list[str], engine: str) -> dict[str, float]:

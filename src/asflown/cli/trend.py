@@ -17,7 +17,7 @@ app = typer.Typer(
 )
 
 STORE = typer.Option(..., "--store", help="A path (SQLite) or a URL (sqlite:///…, postgresql://…).")
-KIND = typer.Option("deploy", "--kind", help="deploy, stow, wheels, inertia or thrust.")
+KIND = typer.Option("deploy", "--kind", help="deploy, stow, wheels, inertia, thrust or gates.")
 WHOSE = typer.Option(None, "--craft", help="Which craft's, where the store holds several.")
 FIGURES = typer.Option(None, "--figures", help="A Python file that declares further figures of merit.")
 LIMIT = typer.Option([], "--limit", help='A figure\'s limit, as in "angular_impulse=-0.5 N m s"; may be repeated.')

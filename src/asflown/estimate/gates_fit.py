@@ -3,7 +3,8 @@
 ``additive`` (default, the corrected one): the orbit determination's variance is added to the model's, sigmas are
 restricted maximum likelihood.  ``printed``: every burn's density to the power of one over its orbit determination's sigma,
 which is no likelihood (the power has a unit), so that its intervals mean nothing.  ``unweighted``: all burns alike, what the
-orbit determination was wrong by counted as execution error, which is what the papers chose for RCS pointing."""
+orbit determination was wrong by counted as execution error, which is what the papers chose for RCS pointing.  ``robust``:
+additive with the tails of Student's t, so that single burns far out count little."""
 
 from __future__ import annotations
 
@@ -18,9 +19,10 @@ from ..maneuvers.table import Maneuvers
 from .gates_intervals import bias_intervals, sigma_interval
 from .gates_likelihood import NOWHERE, Problem
 from .gates_result import GatesFit, ModelScore, Part
+from .gates_robust import FREEDOM, RobustProblem
 
 MODELS = ("estimated-bias", "zero-mean", "mean-aware")
-LIKELIHOODS = ("additive", "printed", "unweighted")
+LIKELIHOODS = ("additive", "robust", "printed", "unweighted")
 #: Terms that can be held, by the names of the result.
 TERMS = ("magnitude_fixed", "magnitude_proportional", "pointing_fixed", "pointing_proportional")
 
@@ -108,8 +110,8 @@ def problems(
             else [prior.magnitude_fixed_mps, prior.magnitude_proportional] if name == "magnitude"
             else [prior.pointing_fixed_mps, prior.pointing_proportional_rad]
         )  # fmt: skip
-        out[name] = Problem.of(
-            error, covariance, m.dv_mps, biased=model != "zero-mean", weight=weight, reml=likelihood == "additive",
+        out[name] = (RobustProblem if likelihood == "robust" else Problem).of(
+            error, covariance, m.dv_mps, biased=model != "zero-mean", weight=weight, reml=likelihood in ("additive", "robust"),
             prior=[x for mean in means for x in (mean, prior_width * mean)] or (0, 0, 0, 0),
             held=(hold.get(f"{name}_fixed"), hold.get(f"{name}_proportional")),
         )  # fmt: skip
@@ -166,13 +168,13 @@ def _doubts(m: Maneuvers, model: str, likelihood: str, parts: list[Part], prior:
     n = len(m)
     if n < FEWEST and prior is None:
         yield (
-            f"{n} burns cannot carry a Gates model of four sigmas and their biases (it takes {FEWEST}, and 20 before sigmas are known "
+            f"{n} burn{'s' if n > 1 else ''} cannot carry a Gates model of four sigmas and their biases (it takes {FEWEST}, and 20 before sigmas are known "
             "to a third): none is given, and the intervals say what can be said"
         )
     elif n < 20:
         yield f"{n} burns are few: sigmas are known to a third or worse"
     spread = float(m.dv_mps.max() / m.dv_mps.min())
-    if spread < _NARROW:
+    if n > 1 and spread < _NARROW:
         yield (
             f"all burns are of one size (largest over smallest {spread:.1f}): fixed and proportional parts are not told apart, "
             f"only their sum near {m.dv_mps.mean():.3g} m/s is known"
@@ -184,7 +186,10 @@ def _doubts(m: Maneuvers, model: str, likelihood: str, parts: list[Part], prior:
             high = part.interval(term)[1]
             limit = "without an upper limit" if high is None else f"below {part.shown(term, high)} with 95 % confidence"
             yield f"{part.name} {term} sigma rests on its bound: a limit ({limit}), not an estimate"
-        if likelihood == "additive" and np.median(part.problem.d) > np.median(part.problem.variances(part.point)) / 2:
+        if (
+            likelihood in ("additive", "robust")
+            and np.median(part.problem.d) > np.median(part.problem.variances(part.point)) / 2
+        ):
             yield f"the orbit determination is less certain of {part.name} errors than they are large: the sigmas hang on its sigmas being right"
         biased, flat = (next((s for s in part.scores if s.model == w), None) for w in ("estimated-bias", "zero-mean"))
         if model == "zero-mean":
@@ -195,6 +200,10 @@ def _doubts(m: Maneuvers, model: str, likelihood: str, parts: list[Part], prior:
         yield "exponent weights make no likelihood: there are no intervals, and its value means nothing (printed, 002 Appendix B)"
     if likelihood == "unweighted":
         yield "unweighted: what the orbit determination was wrong by is counted as execution error"
+    if likelihood == "robust":
+        less = list(dict.fromkeys(m.id[k] for p in parts for k in p.down_weighted))
+        some = ", ".join(less[:8]) + (" and more" if len(less) > 8 else "")
+        yield f"tails of a t of {FREEDOM:g} degrees of freedom: {f'{some} counted less than half' if less else 'every burn counted half or more'}"
     if prior is not None:
         zero = [
             f"{p.name} {t}"

@@ -227,6 +227,15 @@ class Problem:
         )  # fmt: skip
 
     @property
+    def normal(self) -> bool:
+        """Whether errors are taken to be normal."""
+        return True
+
+    def weights(self, point: Point) -> np.ndarray:
+        """What each burn counts beside a usual one, (N,)."""
+        return np.ones(len(np.unique(self.burn)))
+
+    @property
     def units(self) -> np.ndarray:
         """Of fixed and proportional values: m/s, and m/s per m/s."""
         return np.array([self.size, self.size / self.speed])
@@ -248,10 +257,15 @@ class Problem:
             g / u if g is not None else h for g, h, u in zip((fixed, proportional), self.held, self.units, strict=True)
         ]
         free = [g is None for g in given]
+        return self._point(*self._maximised(self._starts(given, near), free))
+
+    def _maximised(self, starts, free):
+        """The kernel's variances, objective and biases."""
         beta = np.zeros(self.X.shape[1])
-        a, b, f = _minimum(self._starts(given, near), *free, self.y, self.d, self.v**2, self.X, self.k, self.reml,
-                           np.array(self.prior), beta)  # fmt: skip
-        return self._point(a, b, f, beta)
+        return *_minimum(starts, *free, self.y, self.d, self.v**2, self.X, self.k, self.reml, np.array(self.prior), beta), beta  # fmt: skip
+
+    def _refitted(self, sets, starts, free):
+        return _refits(sets, starts, *free, self.d, self.v**2, self.X, self.k, self.reml, np.array(self.prior))
 
     def _starts(self, given, near: Point | None) -> np.ndarray:
         """Inside, and from each edge: the likelihood may have a maximum on either."""
@@ -309,7 +323,7 @@ class Problem:
         free = [h is None for h in self.held]
         # without the first edge: of 4000 sets of 8 to 49 burns 0.1 % at most then miss a likelihood higher by up to 0.04
         starts = np.ascontiguousarray(self._starts(self.held, near)[::2])
-        found = _refits(sets, starts, *free, self.d, self.v**2, self.X, self.k, self.reml, np.array(self.prior))
+        found = self._refitted(sets, starts, free)
         found[:, :2] = np.sqrt(found[:, :2]) * self.units
         found[:, 2:] *= self.bias_units
         return found

@@ -46,6 +46,14 @@ class Part:
         values = {"fixed": self.point.fixed, "proportional": self.point.proportional}
         return [t for t, value in values.items() if value == 0 and t not in self.held]
 
+    @property
+    def down_weighted(self) -> dict[int, float]:
+        """Rows of the burns that count less than half, and their weights; of normal errors none."""
+        if not np.isfinite(self.point.objective):
+            return {}
+        weights = self.problem.weights(self.point)
+        return {int(k): float(weights[k]) for k in np.flatnonzero(weights < 0.5)}
+
     def interval(self, term: str) -> Interval:
         return self.sigmas[0 if term == "fixed" else 1]
 
@@ -110,7 +118,9 @@ class Part:
 
     @property
     def log_likelihood_printed(self) -> float:
-        """With the papers' normaliser of a pointing density, sqrt(2 pi) s^2 in place of 2 pi s^2 (002 eq 4)."""
+        """With the papers' normaliser of a pointing density, sqrt(2 pi) s^2 in place of 2 pi s^2 (002 eq 4); NaN where it is no normal one."""
+        if not self.problem.normal:
+            return float("nan")
         return self.log_likelihood + (
             0.25 * LOG_2PI * float(np.sum(self.problem.k)) if self.name == "pointing" else 0.0
         )
@@ -177,6 +187,7 @@ class GatesFit:
             "engine": self.engine, "count": len(self.maneuvers), "model": self.model, "likelihood": self.likelihood,
             "magnitude": self.magnitude.record(), "pointing": _NOTHING if self.pointing is None else self.pointing.record(),
             "at_bound": self.at_bound, "log_likelihood": finite(self.log_likelihood) if self.known else None,
+            "down_weighted": [{"id": self.maneuvers.id[k], "part": p.name, "weight": w} for p in self.parts for k, w in p.down_weighted.items()],
             "dv_mps": [float(self.maneuvers.dv_mps.min()), float(self.maneuvers.dv_mps.max())],
             "excluded": [{"id": i, "reason": r} for i, r in self.maneuvers.excluded],
             "adjusted": {i: [a.name for a in book] for i, book in zip(self.maneuvers.id, self.maneuvers.ledger, strict=True) if book},

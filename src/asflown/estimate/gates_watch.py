@@ -11,13 +11,14 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
-from scipy import optimize, special, stats
+from scipy import optimize, stats
 
 from ..kit.errors import BadInput
 from ..maneuvers.history import PastModel
 from ..maneuvers.model import Gates
 from ..maneuvers.table import Maneuvers
 from .gates_fit import problems
+from .gates_power import detectable
 from .gates_predict import Foreseen, foresee, foresee_by
 from .gates_shift import Shift, find_shift
 
@@ -29,8 +30,6 @@ _SIGMAS = 2.0
 _CHANGED = 1.0
 #: Of the cumulated sum: half the mean shift, in sigmas, that it is quickest to see.
 _REFERENCE = 0.5
-#: The power that a detectable underburn is seen with.
-POWER = 0.8
 
 
 @dataclass(frozen=True)
@@ -221,30 +220,6 @@ def _followed(burns: list[Watched]) -> list[Watched]:
         out.append(replace(b, follows=later))
         later = later or b.criteria[1]
     return out[::-1]
-
-
-def detectable(told: Foreseen, limit_p: float, power: float = POWER) -> float:
-    """Underburn that raises the alarm by itself with this probability, of a burn foreseen so. [m/s]"""
-    sigma = float(np.sqrt(told.covariance[0, 0]))
-    return sigma * (_cut(told, limit_p) + float(special.stdtrit(_freedom(told), power)))
-
-
-def alarm_chance(told: Foreseen, short_mps: float, limit_p: float) -> float:
-    """Probability that a burn which falls short by so much raises the alarm by itself: the power.
-
-    The alarm's threshold stands before the burn is flown, so that only the burn is drawn, not the threshold."""
-    shift = short_mps / float(np.sqrt(told.covariance[0, 0]))
-    cut, freedom = _cut(told, limit_p), _freedom(told)
-    return float(special.stdtr(freedom, shift - cut) + special.stdtr(freedom, -shift - cut))
-
-
-def _freedom(told: Foreseen) -> float:
-    return min(told.freedom, 1e9)  # special's t has no infinity
-
-
-def _cut(told: Foreseen, limit_p: float) -> float:
-    """Error in sigmas at which one burn raises the alarm."""
-    return float(-special.stdtrit(_freedom(told), limit_p / 2))
 
 
 @cache

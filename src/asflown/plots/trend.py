@@ -18,7 +18,7 @@ from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, new_figure
 GREYS = ("#d2d2d2", "#c2c2c2", "#b2b2b2", "#a2a2a2", "#929292", "#828282", "#727272", "#626262", "#525252", "#424242")
 #: Unit of a figure of merit -> factor and unit to draw it in.
 DRAWN_IN = {
-    "N m": (1e3, "mN m"), "N m s": (1.0, "N m s"), "s": (1.0, "s"), "rad": (180 / np.pi, "deg"), "A": (1e3, "mA"),
+    "N m": (1e3, "mN m"), "N m s": (1.0, "N m s"), "m/s": (1e3, "mm/s"), "s": (1.0, "s"), "rad": (180 / np.pi, "deg"), "A": (1e3, "mA"),
     "K": (1.0, "K"), "": (1.0, ""), "N m s/rad": (1e6, "µN m s/rad"), "rad/s": (60 / (2 * np.pi), "rpm"),
 }  # fmt: skip
 BASIS_LOOK = {

@@ -36,7 +36,7 @@ def write_report(healths: list[Health], out: Path, provenance: dict) -> tuple[Pa
     }  # fmt: skip
     page = template("report.html", quantity=_quantity, number=_number, interval=_interval).render(
         healths=healths, main=healths[0], sections=[(h, _pictures(h)) for h in healths],
-        provenance=provenance, version=__version__,
+        provenance=provenance, version=__version__, moves=MOVES,
     )  # fmt: skip
     write_text(out, page)
     write_text(twin, json.dumps(plain(record), allow_nan=False, indent=1) + "\n")

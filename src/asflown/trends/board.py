@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..kit.errors import BadInput, some_of
 from ..kit.quantities import quantity
-from .entry import MOVES, Entry
+from .entry import MOVES, RECORDS, Entry
 from .store import TrendStore
 from .verdicts import Health, judge
 
@@ -38,13 +38,13 @@ def health_in(store: str, craft: str | None, kind: str, limits: list[str], **opt
 
 
 def healths_in(store: str, craft: str | None, limits: list[str]) -> list[Health]:
-    """Verdicts on every kind that has figures: deploys, stows, wheels, inertia, thrust.  Raises BadInput where there is none."""
+    """Verdicts on every kind that has figures: deploys, stows, then records of other kinds.  Raises BadInput where there is none."""
     entries, name = entries_in(store, craft, curves=True)
-    kinds = [k for k in (*MOVES, "wheels", "inertia", "thrust") if any(e.kind == k and e.values for e in entries)]
+    kinds = [k for k in (*MOVES, *RECORDS) if any(e.kind == k and e.values for e in entries)]
     if not kinds:
         raise BadInput(
             f"the store holds nothing of {name} with figures of merit",
-            remedy="`asflown trend add`, and `asflown wheels`, `inertia` or `thrust --store` fill it.",
+            remedy="`asflown trend add`, and `asflown wheels`, `inertia`, `thrust` or `gates --store` fill it.",
         )
     limit = limits_of(limits, entries)
     return [_judged(entries, kind, limit) for kind in kinds]

@@ -7,8 +7,10 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-#: Kinds of actuation; entries of other kinds (wheels) have neither rests that matter nor cycles.
+#: Kinds of actuation.
 MOVES = ("deploy", "stow")
+#: Entries of other kinds, which have neither rests that matter nor cycles.
+RECORDS = ("wheels", "inertia", "thrust", "gates")
 #: What a figure is judged by: the fused torque, or telemetry where the figure is not of the torque.
 BEST = ("fused", "telemetry")
 

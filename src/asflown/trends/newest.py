@@ -64,14 +64,15 @@ def newest_of(values: Values) -> Newest | None:
     )  # of all, the newest too
     floor = float(np.median(values.sigma / s))  # what the events' own sigmas alone make: the past cannot scatter less
     start, slope, scale = _line(x[:past], values.value[:past], s[:past], floor)
+    same = 1e-9 * np.max(np.abs(before.value))
     expected = float(start + slope * x[-1])
+    expected = expected if abs(expected) > same else 0.0
     noise = s * np.random.default_rng(_SEED).standard_normal((DRAWS, past + 1))
     a, b, drawn = _line(x[:past], noise[:, :past], s[:past], floor)
     apart = noise[:, -1] - a - b * x[-1]
     chance, own = apart / drawn, np.std(apart) / drawn
     usual = np.std(apart) * scale / _usual(drawn)
     difference = values.value[-1] - expected
-    same = 1e-9 * np.max(np.abs(before.value))
     if scale * np.median(s) <= same:  # the past never differed: any difference is news
         p, reach, usual = (1.0 if abs(difference) <= same else 0.0), 0.0, 0.0
     else:
