@@ -1,5 +1,7 @@
 """A flyby on a straight line at constant speed, and the flybys, jets and peaks that were published (004 Tables 1 to 4).
 
+Beside Enceladus stands Titan with an exponential atmosphere, whose figures are assumed.
+
 Time counts from closest approach.  Gravity bends the path by 2 mu / (v^2 r): 2.3e-4 rad for E3, 1e-3 for the slow E9; over
 the minute in which a plume acts the place is off by some 100 m.
 """
@@ -15,6 +17,10 @@ import numpy as np
 
 from ..kit.errors import BadInput, some_of
 from ..kit.quantities import quantity
+from .atmosphere import Exponential
+from .environment import magnetic_torque_bound
+
+_BODIES = ("enceladus", "titan")
 
 
 @dataclass(frozen=True)
@@ -25,6 +31,15 @@ class Moon:
     mu_m3_s2: float
     field_T: float
     field_change: float
+    name: str = "Enceladus"
+    atmosphere: Exponential | None = None  # None: what gas there is comes in jets
+
+    @property
+    def small_torques_Nm(self) -> float:
+        """Bound of what sunlight, power generators and the magnetic field do to Cassini there. [N m]   004 section V, eq 20"""
+        row = tables()["small_torques"]
+        magnetic = magnetic_torque_bound(quantity(row["dipole"], "A m2"), self.field_T, self.field_change)
+        return quantity(row["sunlight"], "N m") + quantity(row["power_generators"], "N m") + magnetic
 
 
 @dataclass(frozen=True)
@@ -104,30 +119,39 @@ class PublishedPeak:
 
 
 @cache
-def tables() -> dict:
-    """The tables as they stand in the file, values with their units."""
-    return tomllib.loads((resources.files("asflown.dynamics") / "enceladus.toml").read_text(encoding="utf-8"))
+def tables(body: str = "enceladus") -> dict:
+    """The tables as they stand in a body's file, values with their units."""
+    return tomllib.loads((resources.files("asflown.dynamics") / f"{body}.toml").read_text(encoding="utf-8"))
 
 
 @cache
-def enceladus() -> Moon:
-    m = tables()["moon"]
+def moon(body: str) -> Moon:
+    m = tables(body)["moon"]
+    air = m.get("atmosphere")
     return Moon(
         quantity(m["radius"], "m"),
         quantity(m["gravitational_parameter"], "m3/s2"),
         quantity(m["field"], "T"),
         quantity(m["field_change"], ""),
-    )
+        body.capitalize(),
+        None if air is None else Exponential(
+            quantity(air["density"], "kg/m3"), quantity(air["altitude"], "m"), quantity(air["scale_height"], "m")
+        ),
+    )  # fmt: skip
+
+
+def enceladus() -> Moon:
+    return moon("enceladus")
 
 
 @cache
 def flybys() -> tuple[Flyby, ...]:
     """Every flyby of the tables."""
-    return tuple(_flyby(row) for row in tables()["flyby"])
+    return tuple(_flyby(row, moon(body)) for body in _BODIES for row in tables(body)["flyby"])
 
 
 def flyby_called(name: str) -> Flyby:
-    """'E3', 'e3' or 'enceladus-3'.  Raises BadInput for one that is not there."""
+    """'E3', 'e3', 'enceladus-3', 'Titan'.  Raises BadInput for one that is not there."""
     short = name.strip().upper().replace("ENCELADUS-", "E")
     for f in flybys():
         if f.name == short:
@@ -151,10 +175,10 @@ def published_peaks() -> tuple[PublishedPeak, ...]:
     return tuple(peaks)
 
 
-def _flyby(row: dict) -> Flyby:
+def _flyby(row: dict, passed: Moon) -> Flyby:
     noticed = [quantity(t, "s") for t in row.get("noticed", ())]
     south, west = (quantity(row[k], "rad") if k in row else None for k in ("latitude_south", "longitude_west"))
     return Flyby(
-        row["name"], enceladus(), quantity(row["altitude"], "m"), quantity(row["speed"], "m/s"), south, west,
-        row["date"], (noticed[0], noticed[1]) if noticed else None, row["source"],
+        row["name"], passed, quantity(row["altitude"], "m"), quantity(row["speed"], "m/s"), south, west,
+        row.get("date", ""), (noticed[0], noticed[1]) if noticed else None, row["source"],
     )  # fmt: skip

@@ -18,11 +18,10 @@ import numpy as np
 
 from ..craft.model import Aerodynamics, Craft
 from ..dynamics.drag import PRINTED_E3, torque_per_density
-from ..dynamics.environment import gravity_gradient, gravity_gradient_bound, magnetic_torque_bound
-from ..dynamics.flyby import Flyby, flyby_called, published_peaks, tables
+from ..dynamics.environment import gravity_gradient, gravity_gradient_bound
+from ..dynamics.flyby import Flyby, flyby_called, published_peaks
 from ..dynamics.plume import FARTHEST_M
 from ..kit.errors import BadInput
-from ..kit.quantities import quantity
 from ..kit.timeline import utc_label
 from ..telemetry.telemetry import Telemetry
 from .density_result import Beside, DensityPeak, DensityResult
@@ -102,7 +101,7 @@ def density(
     doubts = [*torque.doubts, *_date_doubts(telemetry, where), *_drag_doubts(air, where, area_m2, arm_m, printed)]
     T, gravity = torque.torque_Nm[:, j], None
     I_B = subject.known_inertia()
-    bound = np.full(len(T), _small_torques(where))
+    bound = np.full(len(T), where.moon.small_torques_Nm)
     if velocity_B is not None and not printed:
         gravity = gravity_gradient(I_B, where.position(time_s, up_B, velocity_B), where.moon.mu_m3_s2)[:, j]
         if slews(telemetry):
@@ -188,13 +187,6 @@ def _scale(air: Aerodynamics) -> tuple[float, list[str]]:
         return air.scale_sigma, []
     doubt = "only the drag coefficient's error is in the scale: area and arm count as exact (scale_sigma in the craft file would hold all)"
     return air.drag_coefficient_sigma / air.drag_coefficient, [doubt]
-
-
-def _small_torques(flyby: Flyby) -> float:
-    """Bound of sunlight, generators and magnetism together. [N m]   004 section V"""
-    row, moon = tables()["small_torques"], flyby.moon
-    magnetic = magnetic_torque_bound(quantity(row["dipole"], "A m2"), moon.field_T, moon.field_change)
-    return quantity(row["sunlight"], "N m") + quantity(row["power_generators"], "N m") + magnetic
 
 
 def _peak(torque: TorqueResult, j, time_s, rho, sigma, scale, flyby, per_density, gravity, known) -> DensityPeak:
