@@ -6,7 +6,20 @@ from pathlib import Path
 
 import typer
 
-from .flyby_options import AREA, ARM, AXIS, CLOSEST, FLYBY, METHOD, UP, VELOCITY, drag_from
+from .flyby_options import (
+    AREA,
+    ARM,
+    AXIS,
+    CLOSEST,
+    FLYBY,
+    KERNELS,
+    METHOD,
+    TRAJECTORY,
+    UP,
+    VELOCITY,
+    drag_from,
+    flyby_from,
+)
 from .options import (
     CHANNELS,
     CRAFT,
@@ -37,6 +50,8 @@ def density(
     arm: str = ARM,
     velocity: str = VELOCITY,
     up: str = UP,
+    trajectory: Path = TRAJECTORY,
+    kernels: list[Path] = KERNELS,
     start: str = START,
     stop: str = STOP,
     channels: Path = CHANNELS,
@@ -51,8 +66,9 @@ def density(
     check_picture(plot)
     ship = craft_from(craft, inertia, None)
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
+    path, of_path = flyby_from(flyby, closest_approach, trajectory, kernels, telemetry, ship)
     drag = drag_from(axis, method, area, arm, velocity, up)
-    result = density_of(telemetry, ship, flyby, closest_approach, variant=variant, **drag)
+    result = density_of(telemetry, ship, path, closest_approach, variant=variant, **drag)
     if plot is not None:
         from asflown.plots.density import save_density_figure
 
@@ -61,9 +77,9 @@ def density(
     if json:
         options = {"craft": craft, "flyby": result.flyby.name, "closest_approach": closest_approach, "axis": result.axis,
                    "method": result.method, "variant": variant, "area": area, "arm": arm, "velocity": velocity, "up": up,
-                   "start": start, "stop": stop, "inertia": inertia}  # fmt: skip
+                   "trajectory": trajectory, "kernels": kernels, "start": start, "stop": stop, "inertia": inertia}  # fmt: skip
         record = {"command": "density"} | result.record()
-        print_json(record | {"provenance": provenance(inputs | hashes(craft), options)})
+        print_json(record | {"provenance": provenance(inputs | of_path | hashes(craft), options)})
         return
     print(result)
     print_doubts(result.doubts)

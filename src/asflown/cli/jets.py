@@ -6,7 +6,20 @@ from pathlib import Path
 
 import typer
 
-from .flyby_options import AREA, ARM, AXIS, CLOSEST, FLYBY, METHOD, UP, VELOCITY, drag_from
+from .flyby_options import (
+    AREA,
+    ARM,
+    AXIS,
+    CLOSEST,
+    FLYBY,
+    KERNELS,
+    METHOD,
+    TRAJECTORY,
+    UP,
+    VELOCITY,
+    drag_from,
+    flyby_from,
+)
 from .options import (
     CHANNELS,
     CRAFT,
@@ -38,6 +51,8 @@ def jets(
     arm: str = ARM,
     velocity: str = VELOCITY,
     up: str = UP,
+    trajectory: Path = TRAJECTORY,
+    kernels: list[Path] = KERNELS,
     start: str = START,
     stop: str = STOP,
     channels: Path = CHANNELS,
@@ -52,10 +67,11 @@ def jets(
     check_picture(plot)
     ship = craft_from(craft, inertia, None)
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
+    path, of_path = flyby_from(flyby, closest_approach, trajectory, kernels, telemetry, ship)
     drag = drag_from(axis, method, area, arm, velocity, up)
     names = None if sources is None else [n.strip().capitalize() for n in sources.split(",")]
     result = fitted_jets(
-        telemetry, ship, flyby, closest_approach, names=names, widths=widths, power=power, angle=angle, **drag
+        telemetry, ship, path, closest_approach, names=names, widths=widths, power=power, angle=angle, **drag
     )
     if plot is not None:
         from asflown.plots.density import save_jets_figure
@@ -65,9 +81,9 @@ def jets(
     if json:
         options = {"craft": craft, "flyby": result.density.flyby.name, "closest_approach": closest_approach, "axis": axis, "method": method,
                    "sources": sources, "widths": widths, "power": power, "angle": angle, "area": area, "arm": arm, "velocity": velocity,
-                   "up": up, "start": start, "stop": stop, "inertia": inertia}  # fmt: skip
+                   "up": up, "trajectory": trajectory, "kernels": kernels, "start": start, "stop": stop, "inertia": inertia}  # fmt: skip
         record = {"command": "jets"} | result.record()
-        print_json(record | {"provenance": provenance(inputs | hashes(craft), options)})
+        print_json(record | {"provenance": provenance(inputs | of_path | hashes(craft), options)})
         return
     print(result)
     print_doubts(result.doubts)

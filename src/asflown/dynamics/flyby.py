@@ -59,6 +59,11 @@ class Flyby:
     source: str = ""
 
     @property
+    def doubts(self) -> tuple[str, ...]:
+        """What is not as it should be about the path: of a straight line from the tables nothing."""
+        return ()
+
+    @property
     def closest_m(self) -> float:
         """Least distance from the moon's centre."""
         return self.moon.radius_m + self.altitude_m
@@ -74,6 +79,19 @@ class Flyby:
     def climb_rate(self, time_s) -> np.ndarray:
         """d altitude / dt. [m/s]"""
         return self.speed_m_s**2 * np.asarray(time_s, float) / self.distance(time_s)
+
+    def speed(self, time_s) -> np.ndarray:
+        """Relative to the body. [m/s]"""
+        return np.full(np.shape(time_s), self.speed_m_s)
+
+    def from_source(self, jet, time_s) -> tuple[np.ndarray, np.ndarray]:
+        """Position from a jet's source (N, 3) [m] and the jet's axis (3,): the axes of ``in_plane``, and across that plane.   004 eq 23
+
+        The axis is taken to lie in the plane, as in the paper."""
+        along = np.array([np.sin(jet.tilt_rad), np.cos(jet.tilt_rad), 0.0])
+        place = self.in_plane(time_s)
+        across = np.full((*place.shape[:-1], 1), jet.offset_m)
+        return np.concatenate([place - self.moon.radius_m * along[:2], across], axis=-1), along
 
     def in_plane(self, time_s) -> np.ndarray:
         """From the moon's centre, in the plane of trajectory and spin axis: away from the axis on the side of closest

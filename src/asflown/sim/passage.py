@@ -7,6 +7,7 @@ formulas and figures; gravity gradient and everything that moves are the simulat
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -60,7 +61,7 @@ def passed(p: Passage, now: CraftAt, start_s: float, stop_s: float) -> Passed:
 
     Raises BadInput for an unknown flyby or jet, for one whose place jets need, and where drag or inertia are not known."""
     where = flyby_called(p.name)
-    given = {"altitude_m": p.altitude, "speed_m_s": p.speed, "latitude_south_rad": p.latitude_south,
+    given: dict[str, Any] = {"altitude_m": p.altitude, "speed_m_s": p.speed, "latitude_south_rad": p.latitude_south,
              "longitude_west_rad": p.longitude_west}  # fmt: skip
     where = replace(where, **{k: v for k, v in given.items() if v is not None})
     air = now.craft.aerodynamics
