@@ -31,10 +31,14 @@ from .thrust_priors import Priors, priors_for
 THRUST_SHARE = 0.2
 #: A hold turns by no more than this. [rad]
 _HOLD = 0.03
+#: A pulse is over where a sample lacks less than this share of it.
+OVER = 0.25
 #: Samples closer than this while something fires are taken one by one. [s]
 _EVERY_S = 0.25
 #: Runs of samples without firing from which the noise is taken; with fewer all are.
 _FEWEST_RUNS = 10
+#: Noise is at least this share of what the momentum swings by.
+_LEAST = 1e-4
 
 
 @dataclass(frozen=True)
@@ -59,7 +63,7 @@ class Gained:
     rebuilt: Callable[[np.ndarray], Gained] | None = None
 
     def with_late(self, late) -> Gained:
-        """The same where only the samples ``late`` (K + 1,) bool may lack a part of a pulse."""
+        """The same where only the samples ``late`` (K + 1,) bool may lack up to a whole pulse: others lack less than OVER of it."""
         return self if self.rebuilt is None else self.rebuilt(late)
 
     def sample_errors(self, left, uncertainty) -> tuple[np.ndarray, np.ndarray]:
@@ -117,7 +121,6 @@ def _on_thrusters(telemetry: Telemetry, craft: Craft, axis: str) -> Gained:
     arms = np.cross(whole.places - priors.center_m, whole.along)[:, j]
     chain = replace(whole, steps=whole.steps[:, [j]], turn=None, places=arms, nuisances=())
     sigma = _noise(chain)
-    chain = replace(chain, sample_sigma=np.full(len(f.tai_ns), sigma))
     valve, thrust = valve_of(f.thrusters, priors.fall_s), _thrust(f, craft)
     lately = np.abs(arms) * thrust * float(valve.effective(f.step_s)) * (chain.known.rate > 0)
     settings = {
@@ -126,10 +129,16 @@ def _on_thrusters(telemetry: Telemetry, craft: Craft, axis: str) -> Gained:
         "pulses": float(f.total_pulses[np.abs(arms) > 0].sum()), "pulses_counted": f.counters.counted,
     }  # fmt: skip
 
+    # of a pulse that is over its tail is: what a share m of it lacks lasts fall dm / m
+    tail = chain.known.rate * valve.fall_s * (chain.known.rate > 0)
+
     def built(late: np.ndarray) -> Gained:
         known = chain.known._replace(duty=chain.known.duty * late[:, None], rate=chain.known.rate * late[:, None])
-        here = replace(chain, known=known)
-        given = arms * thrust * here.effective(valve)  # (K, j)
+        over = (~late)[:, None] * tail
+        variance = (lately.sum(axis=1) ** 2) * over.max(axis=1) * OVER**2 / 2
+        here = replace(chain, known=known, sample_sigma=np.sqrt(sigma**2 + variance))
+        lacking = np.diff(over * OVER * float(valve.effective(f.step_s)), axis=0)
+        given = arms * thrust * (here.effective(valve) - lacking)  # (K, j)
         names, columns = _unknowns(f, here, valve, thrust, arms, j, given, priors)
         covariance = here.covariance(
             np.full(len(arms), thrust), priors.center_m, valve, priors.pulse_scatter, here.noise(here.steps)
@@ -148,7 +157,8 @@ def _noise(chain: Chain) -> float:
     third = s[:-2] - 2 * s[1:-1] + s[2:]
     still = quiet[:-2] & quiet[1:-1] & quiet[2:]
     third = third[still] if still.sum() >= _FEWEST_RUNS else third
-    return max(1.4826 * float(np.median(np.abs(third))) / 20**0.5, 1e-9)
+    least = _LEAST * float(np.abs(np.cumsum(s)).max())  # a record without noise has rounding, and its matrices need some
+    return max(1.4826 * float(np.median(np.abs(third))) / 20**0.5, least, 1e-9)
 
 
 def _thrust(f: Firings, craft: Craft) -> float:

@@ -14,7 +14,7 @@ from scipy.linalg import solve_triangular
 from ..craft.model import Craft
 from ..kit.errors import BadInput
 from ..telemetry.telemetry import Telemetry
-from .on_times import THRUST_SHARE, Gained, gained
+from .on_times import OVER, THRUST_SHARE, Gained, gained
 from .result import AXES, TorqueResult
 
 _FEWEST, _LONGEST = 20, 2000  # steps, knots
@@ -23,8 +23,8 @@ _DRAWS = 300
 _BENDS = np.geomspace(1e-5, 0.1, 13)
 #: Over so long the torque bends alike; rounds of finding how much; a bend is at least this share of the largest, squared.
 _ALIKE_S, _ROUNDS, _LEAST = 6.0, 12, 1e-6
-#: A pulse is over where its sample lacks less than this share of it, known to that.
-_OVER, _SURE, _SETTLING = 0.25, 0.12, 6
+#: One sigma, as a share of a pulse, to which it must be known that one is over; rounds of finding them.
+_SURE, _SETTLING = 0.12, 6
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ def settled(g: Gained) -> tuple[Gained, Smoothed]:
     for _ in range(_SETTLING):
         root = np.linalg.cholesky(s.covariance + 1e-18 * np.diag(np.diag(s.covariance)))
         off, sigma = g.sample_errors(s.left_Nms, s.design @ root)
-        over = late & (np.abs(off) < _OVER * g.late_Nms) & (sigma < _SURE * g.late_Nms)
+        over = late & (np.abs(off) < OVER * g.late_Nms) & (sigma < _SURE * g.late_Nms)
         if not over.any():
             break
         late &= ~over
