@@ -26,6 +26,7 @@ from .options import (
     EXCLUDE,
     INERTIA,
     JSON,
+    PLOT_DIR,
     START,
     STOP,
     check_picture,
@@ -58,12 +59,16 @@ def density(
     exclude: Path = EXCLUDE,
     inertia: str = INERTIA,
     plot: Path = typer.Option(None, "--plot", help="Draw the density (SVG, PNG or PDF by its suffix)."),
+    plot_dir: Path = PLOT_DIR,
     json: bool = JSON,
 ) -> None:
     """Density of the gas that a craft meets in a flyby, from the torque it exerts."""
     from asflown.estimate.density import density as density_of
+    from asflown.kit.files import check_folder
 
     check_picture(plot)
+    if plot_dir is not None:
+        check_folder(plot_dir)
     ship = craft_from(craft, inertia, None)
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
     path, of_path = flyby_from(flyby, closest_approach, trajectory, kernels, telemetry, ship)
@@ -74,6 +79,12 @@ def density(
 
         save_density_figure(result, plot)
         say(f"wrote {plot}")
+    if plot_dir is not None:
+        from asflown.plots.figure import save_figures
+        from asflown.plots.flyby import flyby_figures
+
+        for path in save_figures(flyby_figures(result, telemetry, ship), plot_dir):
+            say(f"wrote {path}")
     if json:
         options = {"craft": craft, "flyby": result.flyby.name, "closest_approach": closest_approach, "axis": result.axis,
                    "method": result.method, "variant": variant, "area": area, "arm": arm, "velocity": velocity, "up": up,

@@ -26,6 +26,7 @@ from .options import (
     EXCLUDE,
     INERTIA,
     JSON,
+    PLOT_DIR,
     START,
     STOP,
     check_picture,
@@ -59,12 +60,16 @@ def jets(
     exclude: Path = EXCLUDE,
     inertia: str = INERTIA,
     plot: Path = typer.Option(None, "--plot", help="Draw jets and density (SVG, PNG or PDF by its suffix)."),
+    plot_dir: Path = PLOT_DIR,
     json: bool = JSON,
 ) -> None:
     """Densities and widths of a plume's jets, from the momentum they gave a craft; what the telemetry does not tell is said."""
     from asflown.estimate.jets import jets as fitted_jets
+    from asflown.kit.files import check_folder
 
     check_picture(plot)
+    if plot_dir is not None:
+        check_folder(plot_dir)
     ship = craft_from(craft, inertia, None)
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
     path, of_path = flyby_from(flyby, closest_approach, trajectory, kernels, telemetry, ship)
@@ -78,6 +83,12 @@ def jets(
 
         save_jets_figure(result, plot)
         say(f"wrote {plot}")
+    if plot_dir is not None:
+        from asflown.plots.figure import save_figures
+        from asflown.plots.flyby import flyby_figures
+
+        for path in save_figures(flyby_figures(result.density, telemetry, ship, result), plot_dir):
+            say(f"wrote {path}")
     if json:
         options = {"craft": craft, "flyby": result.density.flyby.name, "closest_approach": closest_approach, "axis": axis, "method": method,
                    "sources": sources, "widths": widths, "power": power, "angle": angle, "area": area, "arm": arm, "velocity": velocity,

@@ -172,7 +172,7 @@ def flyby_called(name: str) -> Flyby:
     """'E3', 'e3', 'enceladus-3', 'Titan'.  Raises BadInput for one that is not there."""
     short = name.strip().upper().replace("ENCELADUS-", "E")
     for f in flybys():
-        if f.name == short:
+        if f.name.upper() == short:
             return f
     raise BadInput(f"{name!r} is no flyby of the tables", remedy=f"Name one of: {some_of(f.name for f in flybys())}.")
 
