@@ -6,7 +6,7 @@ there, is that for which the record is likeliest.  Thrust and fall time are solv
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -48,15 +48,17 @@ class Smoothed:
 def torque_on_times(telemetry: Telemetry, craft: Craft, axis: str) -> tuple[TorqueResult, Gained]:
     """About one axis, with its posterior's draws, and the steps it is from; the impulse between samples is in ``settings``.
 
+    The steps are those before any pulse is taken to be over: errors of what is taken for given would pull the thrust down.
+
     Raises BadInput where ``gained`` does, and for a record too short or too long."""
-    g = gained(telemetry, craft, axis)
-    if len(g.impulse_Nms) < _FEWEST:
+    steps = gained(telemetry, craft, axis)
+    if len(steps.impulse_Nms) < _FEWEST:
         raise BadInput(
-            f"{len(g.impulse_Nms)} steps between samples of momentum and on-times are too few",
+            f"{len(steps.impulse_Nms)} steps between samples of momentum and on-times are too few",
             file=telemetry.source or None,
             remedy=f"Take a record of at least {_FEWEST}.",
         )
-    g, s = settled(g)
+    g, s = settled(steps)
     j, M, m = AXES.index(axis), len(s.time_s), len(g.names)
     torque, sigma = np.full((M, 3), np.nan), np.full((M, 3), np.nan)
     torque[:, j] = s.torque_Nm
@@ -73,7 +75,7 @@ def torque_on_times(telemetry: Telemetry, craft: Craft, axis: str) -> tuple[Torq
         craft=craft.name, method="on-times", variant="corrected", axis=axis, epoch=telemetry.epoch_label, time_s=s.time_s,
         torque_Nm=torque, sigma_Nm=sigma, momentum_Nms=None, doubts=(*g.doubts, *_doubts(g, s)), settings=settings, paths_Nm=paths,
     )  # fmt: skip
-    return result, g
+    return result, steps
 
 
 def smoothed(g: Gained) -> Smoothed:
@@ -132,9 +134,11 @@ def settled(g: Gained) -> tuple[Gained, Smoothed]:
     """The torque where pulses fired shortly before a sample are, one by one, found to have been given in full.
 
     Beforehand such a sample is off by anything up to a pulse.  Where the fit finds what it is off by to be next to nothing, and
-    knows that well, the pulse was over: the sample is then as good as any, which tells its neighbours."""
+    knows that well, the pulse was over: the sample is then as good as any, which tells its neighbours.  The thrusters' unknowns
+    stay as they were beforehand: that what is taken for given has errors would pull them down (by 0.6 % for Titan)."""
     late = g.late_Nms > 0
-    s = smoothed(g)
+    first = smoothed(g)
+    s = first
     for _ in range(_SETTLING):
         root = np.linalg.cholesky(s.covariance + 1e-18 * np.diag(np.diag(s.covariance)))
         off, sigma = g.sample_errors(s.left_Nms, s.design @ root)
@@ -143,8 +147,19 @@ def settled(g: Gained) -> tuple[Gained, Smoothed]:
             break
         late &= ~over
         g = g.with_late(late)
-        s = smoothed(g)
+        s = _believing(g, first)
     return g, s
+
+
+def _believing(g: Gained, first: Smoothed) -> Smoothed:
+    """The torque with the unknowns and their covariance as another fit has them."""
+    M = len(first.time_s)
+    u, C = first.unknowns, first.covariance[M:, M:]
+    known = replace(g, impulse_Nms=g.impulse_Nms + g.columns @ u, columns=g.columns[:, :0], names=())
+    s = smoothed(known)
+    moves = s.covariance @ (s.design.T @ g.covariance.solve(g.columns)) if len(u) else np.zeros((M, 0))
+    whole = np.block([[s.covariance + moves @ C @ moves.T, moves @ C], [C @ moves.T, C]])
+    return replace(s, unknowns=u, covariance=whole, design=np.hstack([s.design, -g.columns]))
 
 
 def areas(time_s, knots) -> np.ndarray:
