@@ -10,7 +10,7 @@ from asflown.dynamics.flyby import flyby_called, published_peaks
 from asflown.estimate.density import density
 from asflown.estimate.jets import jets
 from asflown.estimate.on_times import gained
-from asflown.estimate.torque_on_times import areas, settled, torque_on_times
+from asflown.estimate.torque_on_times import areas, torque_on_times
 from asflown.kit.errors import BadInput
 from asflown.sim.fly import fly
 from asflown.telemetry.tables import write_table
@@ -68,24 +68,14 @@ def test_law_areas_are_the_integrals_of_a_piecewise_linear_curve():
 
 
 def test_law_momentum_less_what_thrusters_gave_is_the_impulse_from_outside():
-    """Without noise, thrust known: every step whose ends no pulse reaches into."""
+    """Without noise, thrust known: but for tails still to come where a sample is taken soon after a pulse."""
     f = flown(noise="none", thrust="1.0101489522443345 N", seed=5)
-    g = gained(f.telemetry, CASSINI, "z").with_late(np.zeros(151, bool))
+    g = gained(f.telemetry, CASSINI, "z")
     given = np.concatenate([[0], np.cumsum(0.125 * f.truth.torque_Nm[:-1, 2])])
     outside = np.diff(np.interp(g.time_s, f.truth.time_s, given))
     off = np.abs(g.impulse_Nms - outside)
     assert np.median(off) < 3e-4  # N m s: pulses give 0.42 each, to 2 %
     assert np.mean(off < 0.025) > 0.9
-
-
-def test_law_pulses_found_to_be_over_leave_the_impulse_as_it_was():
-    g = gained(flown().telemetry, CASSINI, "z")
-    assert (g.late_Nms > 0).sum() > 12 and g.late_Nms.max() == pytest.approx(0.42, abs=0.03)
-    after, s = settled(g)
-    assert (after.late_Nms > 0).sum() <= 3
-    # what one step gains the next loses: the sum over the record stays but for tails at its ends
-    assert after.impulse_Nms.sum() == pytest.approx(g.impulse_Nms.sum(), abs=0.02)
-    assert s.covariance.shape == (len(s.time_s) + len(g.names),) * 2
 
 
 def test_law_an_atmospheres_scale_height_does_not_depend_on_the_scale_of_drag():

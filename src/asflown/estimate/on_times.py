@@ -9,7 +9,6 @@ tells the surroundings' torque by itself, and so do pulses their own thrust: on 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,8 +30,6 @@ from .thrust_priors import Priors, priors_for
 THRUST_SHARE = 0.2
 #: A hold turns by no more than this. [rad]
 _HOLD = 0.03
-#: A pulse is over where a sample lacks less than this share of it.
-OVER = 0.25
 #: Samples closer than this while something fires are taken one by one. [s]
 _EVERY_S = 0.25
 #: Runs of samples without firing from which the noise is taken; with fewer all are.
@@ -47,8 +44,7 @@ class Gained:
 
     ``impulse_Nms`` (K,): gained, less what thrusters of the thrust believed gave.  ``columns`` (K, m): what one sigma of each of
     the m unknowns ``names`` adds to that.  ``covariance``: of the steps, which share their samples' noise.
-    ``late_Nms`` (K + 1,): what a pulse may still have to give when a sample is taken, at most, where one was fired lately; zero
-    where none was.  ``inertia_share``: one sigma of the body's inertia, by which everything is off together."""
+    ``inertia_share``: one sigma of the body's inertia, by which everything is off together."""
 
     axis: str
     time_s: np.ndarray
@@ -56,29 +52,9 @@ class Gained:
     columns: np.ndarray
     names: tuple[str, ...]
     covariance: Covariance
-    late_Nms: np.ndarray
     inertia_share: float
     settings: dict
     doubts: tuple[str, ...]
-    rebuilt: Callable[[np.ndarray], Gained] | None = None
-
-    def with_late(self, late) -> Gained:
-        """The same where only the samples ``late`` (K + 1,) bool may lack up to a whole pulse: others lack less than OVER of it."""
-        return self if self.rebuilt is None else self.rebuilt(late)
-
-    def sample_errors(self, left, uncertainty) -> tuple[np.ndarray, np.ndarray]:
-        """What each sample is off by, (K + 1,), and one sigma of that, from the steps less all that explains them.
-
-        ``left`` (K,): y - X x; ``uncertainty`` (K, r): X times a root of the covariance of x."""
-        own = np.r_[self.noise_Nms**2, -self.covariance.bands[1, :-1], self.noise_Nms**2]
-        D = np.diff(np.eye(len(own)), axis=0) * own
-        CD, CU = self.covariance.solve(D), self.covariance.solve(uncertainty)
-        fixed = np.einsum("ki,ki->i", D, CD) - np.sum((D.T @ CU) ** 2, axis=1)
-        return CD.T @ left, np.sqrt(np.maximum(own - fixed, 0.0))
-
-    @property
-    def noise_Nms(self) -> float:
-        return self.settings["momentum_noise_Nms"]
 
 
 def gained(telemetry: Telemetry, craft: Craft, axis: str) -> Gained:
@@ -94,8 +70,7 @@ def gained(telemetry: Telemetry, craft: Craft, axis: str) -> Gained:
     main = np.full((len(t) - 1, 1, 1), 2 * sigma**2)
     return Gained(
         axis, t, np.diff(s.momentum[:, j]), np.zeros((len(t) - 1, 0)), (), Covariance.of(main, -0.5 * main[1:]),
-        np.zeros(len(t)), INERTIA_SHARE,
-        {"momentum_noise_Nms": sigma}, (*subject.doubts, *s.doubts),
+        INERTIA_SHARE, {"momentum_noise_Nms": sigma}, (*subject.doubts, *s.doubts),
     )  # fmt: skip
 
 
@@ -122,33 +97,21 @@ def _on_thrusters(telemetry: Telemetry, craft: Craft, axis: str) -> Gained:
     chain = replace(whole, steps=whole.steps[:, [j]], turn=None, places=arms, nuisances=())
     sigma = _noise(chain)
     valve, thrust = valve_of(f.thrusters, priors.fall_s), _thrust(f, craft)
-    lately = np.abs(arms) * thrust * float(valve.effective(f.step_s)) * (chain.known.rate > 0)
     settings = {
         "momentum_noise_Nms": sigma, "thrust_believed_N": thrust, "thrust_share": THRUST_SHARE,
         "fall_time_s": [priors.fall_s, priors.fall_sigma_s], "pulse_scatter": priors.pulse_scatter,
         "pulses": float(f.total_pulses[np.abs(arms) > 0].sum()), "pulses_counted": f.counters.counted,
     }  # fmt: skip
-
-    # of a pulse that is over its tail is: what a share m of it lacks lasts fall dm / m
-    tail = chain.known.rate * valve.fall_s * (chain.known.rate > 0)
-
-    def built(late: np.ndarray) -> Gained:
-        known = chain.known._replace(duty=chain.known.duty * late[:, None], rate=chain.known.rate * late[:, None])
-        over = (~late)[:, None] * tail
-        variance = (lately.sum(axis=1) ** 2) * over.max(axis=1) * OVER**2 / 2
-        here = replace(chain, known=known, sample_sigma=np.sqrt(sigma**2 + variance))
-        lacking = np.diff(over * OVER * float(valve.effective(f.step_s)), axis=0)
-        given = arms * thrust * (here.effective(valve) - lacking)  # (K, j)
-        names, columns = _unknowns(f, here, valve, thrust, arms, j, given, priors)
-        covariance = here.covariance(
-            np.full(len(arms), thrust), priors.center_m, valve, priors.pulse_scatter, here.noise(here.steps)
-        )
-        return Gained(
-            axis, telemetry.seconds(f.tai_ns), here.steps[:, 0] - given.sum(axis=1), columns, names, covariance,
-            lately.sum(axis=1) * late, priors.inertia_share, settings, f.doubts, built,
-        )  # fmt: skip
-
-    return built(np.ones(len(f.tai_ns), bool))
+    chain = replace(chain, sample_sigma=np.full(len(f.tai_ns), sigma))
+    given = arms * thrust * chain.effective(valve)  # (K, j)
+    names, columns = _unknowns(f, chain, valve, thrust, arms, j, given, priors)
+    covariance = chain.covariance(
+        np.full(len(arms), thrust), priors.center_m, valve, priors.pulse_scatter, chain.noise(chain.steps)
+    )
+    return Gained(
+        axis, telemetry.seconds(f.tai_ns), chain.steps[:, 0] - given.sum(axis=1), columns, names, covariance,
+        priors.inertia_share, settings, f.doubts,
+    )  # fmt: skip
 
 
 def _noise(chain: Chain) -> float:

@@ -6,7 +6,7 @@ there, is that for which the record is likeliest.  Thrust and fall time are solv
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -14,7 +14,7 @@ from scipy.linalg import solve_triangular
 from ..craft.model import Craft
 from ..kit.errors import BadInput
 from ..telemetry.telemetry import Telemetry
-from .on_times import OVER, THRUST_SHARE, Gained, gained
+from .on_times import THRUST_SHARE, Gained, gained
 from .result import AXES, TorqueResult
 
 _FEWEST, _LONGEST = 20, 2000  # steps, knots
@@ -23,8 +23,6 @@ _DRAWS = 300
 _BENDS = np.geomspace(1e-5, 0.1, 13)
 #: Over so long the torque bends alike; rounds of finding how much; a bend is at least this share of the largest, squared.
 _ALIKE_S, _ROUNDS, _LEAST = 6.0, 12, 1e-6
-#: One sigma, as a share of a pulse, to which it must be known that one is over; rounds of finding them.
-_SURE, _SETTLING = 0.12, 6
 
 
 @dataclass(frozen=True)
@@ -35,8 +33,6 @@ class Smoothed:
     torque_Nm: np.ndarray
     unknowns: np.ndarray
     covariance: np.ndarray  # (M + m, M + m)
-    left_Nms: np.ndarray  # (K,), of the steps
-    design: np.ndarray  # (K, M + m)
 
     def draws(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """Torques from the posterior, (count, M)."""
@@ -48,34 +44,28 @@ class Smoothed:
 def torque_on_times(telemetry: Telemetry, craft: Craft, axis: str) -> tuple[TorqueResult, Gained]:
     """About one axis, with its posterior's draws, and the steps it is from; the impulse between samples is in ``settings``.
 
-    The steps are those before any pulse is taken to be over: errors of what is taken for given would pull the thrust down.
-
     Raises BadInput where ``gained`` does, and for a record too short or too long."""
-    steps = gained(telemetry, craft, axis)
-    if len(steps.impulse_Nms) < _FEWEST:
+    g = gained(telemetry, craft, axis)
+    if len(g.impulse_Nms) < _FEWEST:
         raise BadInput(
-            f"{len(steps.impulse_Nms)} steps between samples of momentum and on-times are too few",
+            f"{len(g.impulse_Nms)} steps between samples of momentum and on-times are too few",
             file=telemetry.source or None,
             remedy=f"Take a record of at least {_FEWEST}.",
         )
-    g, s = settled(steps)
-    j, M, m = AXES.index(axis), len(s.time_s), len(g.names)
+    s = smoothed(g)
+    j, M = AXES.index(axis), len(s.time_s)
     torque, sigma = np.full((M, 3), np.nan), np.full((M, 3), np.nan)
     torque[:, j] = s.torque_Nm
     sigma[:, j] = np.hypot(np.sqrt(np.diag(s.covariance)[:M]), g.inertia_share * s.torque_Nm)
     rng = np.random.default_rng(1)
     paths = np.full((_DRAWS, M, 3), np.nan)
     paths[:, :, j] = s.draws(_DRAWS, rng) * (1 + g.inertia_share * rng.standard_normal((_DRAWS, 1)))
-    settings = g.settings | {
-        "samples_amid_pulses": int((g.late_Nms > 0).sum()),
-        **_thrust_found(g, s),
-        "impulses": _impulses(g, s, m),
-    }
+    settings = g.settings | _thrust_found(g, s) | {"impulses": _impulses(g, s)}
     result = TorqueResult(
         craft=craft.name, method="on-times", variant="corrected", axis=axis, epoch=telemetry.epoch_label, time_s=s.time_s,
         torque_Nm=torque, sigma_Nm=sigma, momentum_Nms=None, doubts=(*g.doubts, *_doubts(g, s)), settings=settings, paths_Nm=paths,
     )  # fmt: skip
-    return result, steps
+    return result, g
 
 
 def smoothed(g: Gained) -> Smoothed:
@@ -120,7 +110,7 @@ def smoothed(g: Gained) -> Smoothed:
         square = (D @ x[:count]) ** 2 + np.sum((root[:, :count] @ D.T) ** 2, axis=0)
         variance = np.maximum(near @ square, _LEAST * square.max())
     x, root = posterior(variance)
-    return Smoothed(knots, x[:count], x[count:], root.T @ root, g.impulse_Nms - X @ x, X)
+    return Smoothed(knots, x[:count], x[count:], root.T @ root)
 
 
 def _nearby(count: int, reach: float) -> np.ndarray:
@@ -128,38 +118,6 @@ def _nearby(count: int, reach: float) -> np.ndarray:
     k = np.arange(count)
     w = np.clip(1 - np.abs(k[:, None] - k) / reach, 0, None)
     return w / w.sum(axis=1, keepdims=True)
-
-
-def settled(g: Gained) -> tuple[Gained, Smoothed]:
-    """The torque where pulses fired shortly before a sample are, one by one, found to have been given in full.
-
-    Beforehand such a sample is off by anything up to a pulse.  Where the fit finds what it is off by to be next to nothing, and
-    knows that well, the pulse was over: the sample is then as good as any, which tells its neighbours.  The thrusters' unknowns
-    stay as they were beforehand: that what is taken for given has errors would pull them down (by 0.6 % for Titan)."""
-    late = g.late_Nms > 0
-    first = smoothed(g)
-    s = first
-    for _ in range(_SETTLING):
-        root = np.linalg.cholesky(s.covariance + 1e-18 * np.diag(np.diag(s.covariance)))
-        off, sigma = g.sample_errors(s.left_Nms, s.design @ root)
-        over = late & (np.abs(off) < OVER * g.late_Nms) & (sigma < _SURE * g.late_Nms)
-        if not over.any():
-            break
-        late &= ~over
-        g = g.with_late(late)
-        s = _believing(g, first)
-    return g, s
-
-
-def _believing(g: Gained, first: Smoothed) -> Smoothed:
-    """The torque with the unknowns and their covariance as another fit has them."""
-    M = len(first.time_s)
-    u, C = first.unknowns, first.covariance[M:, M:]
-    known = replace(g, impulse_Nms=g.impulse_Nms + g.columns @ u, columns=g.columns[:, :0], names=())
-    s = smoothed(known)
-    moves = s.covariance @ (s.design.T @ g.covariance.solve(g.columns)) if len(u) else np.zeros((M, 0))
-    whole = np.block([[s.covariance + moves @ C @ moves.T, moves @ C], [C @ moves.T, C]])
-    return replace(s, unknowns=u, covariance=whole, design=np.hstack([s.design, -g.columns]))
 
 
 def areas(time_s, knots) -> np.ndarray:
@@ -171,12 +129,12 @@ def areas(time_s, knots) -> np.ndarray:
     return step * np.diff(ramp, axis=0)
 
 
-def _impulses(g: Gained, s: Smoothed, m: int) -> list[dict]:
+def _impulses(g: Gained, s: Smoothed) -> list[dict]:
     """What the surroundings gave from each sample to the next, with the thrust found; sigma of the samples and of the thrust."""
     M = len(s.time_s)
     value = g.impulse_Nms + g.columns @ s.unknowns
     shared = np.einsum("km,mn,kn->k", g.columns, s.covariance[M:, M:], g.columns)
-    sigma = np.sqrt(g.covariance.bands[0] + shared)
+    sigma = np.sqrt(g.covariance.variance + shared)
     return [
         {"start_s": float(a), "stop_s": float(b), "impulse_Nms": float(v), "sigma_Nms": float(e)}
         for a, b, v, e in zip(g.time_s[:-1], g.time_s[1:], value, sigma, strict=True)

@@ -84,11 +84,11 @@ def draw_geometry(result: DensityResult, ax):
 
     P, Q, R: where the plume is first noticed, at its peak, last noticed; 004's own where they are published (E3)."""
     flyby, radius = result.flyby, result.flyby.moon.radius_m / 1e3
-    turn = np.linspace(0, 2 * np.pi, 361)
+    turn = np.linspace(0, 2 * np.pi, 121)
     ax.fill(radius * np.sin(turn), radius * np.cos(turn), color="#dfe7ee", edgecolor=GREY, linewidth=1.0)
     ax.text(0, 0, flyby.moon.name, ha="center", va="center", fontsize=9, color=GREY)
     start, stop = -30.0, max(120.0, (flyby.noticed_s or (0, 0))[1] + 8)
-    path = _projected(flyby, np.linspace(start, stop, 200))
+    path = _projected(flyby, np.linspace(start, stop, 50))
     far = float(np.abs(path).max())
     if flyby.moon.atmosphere is None and flyby.longitude_west_rad is not None:
         for jet, color in zip(published_jets(), (GREEN, ORANGE, PURPLE), strict=True):
