@@ -168,7 +168,7 @@ def _check_flyable(scenario: Scenario, now: CraftAt) -> None:
             )
 
 
-def _plant(scenario: Scenario, now: CraftAt, part: MovingPart | None, met: Passed | None) -> Plant:
+def _plant(scenario: Scenario, now: CraftAt, part: MovingPart | None, met: Passed | None = None) -> Plant:
     coupling, natural, damping = swinging(scenario, now)
     drag = [(w.drag.viscous, w.drag.coulomb, w.drag.stiction) if scenario.friction else (0.0,) * 3 for w in now.wheels]
     times, torques = torque_table(scenario, met)
