@@ -137,7 +137,7 @@ def test_recovery_of_e5_over_many_flybys(exponent):
         pulls.append((r.peak.density_kgm3 - rho) / r.peak.sigma_shape_kgm3)
         late.append(r.peak.time_s + E5_S - at)
         thrust.append((r.settings["torque"]["thrust_N"] - believed) / r.settings["torque"]["thrust_sigma_N"])
-    assert np.mean(off) == pytest.approx({1: -0.09, 2: -0.04}[exponent], abs=0.03)
+    assert np.mean(off) == pytest.approx({1: -0.10, 2: -0.02}[exponent], abs=0.03)
     assert np.sqrt(np.mean(np.square(pulls))) < {1: 2.5, 2: 1.5}[exponent]
     assert np.abs(np.mean(late)) < 2 and np.abs(np.mean(thrust)) < 0.5
 
@@ -154,7 +154,8 @@ def test_it_is_chosen_where_thrusters_fire_and_only_there():
 
 
 @pytest.mark.parametrize(("telemetry", "words"), [
-    (lambda t: t.between(0, 30), "too few"),
+    (lambda t: t.between(300, 360), "too few"),
+    (lambda t: fly("quiet", duration="120 s").telemetry, "no thruster fires"),
     (lambda t: fly("slews", seed=1, duration="600 s", thrusters={"center_of_mass": "0 0 1.35 m"}).telemetry, "turns by"),
 ])  # fmt: skip
 def test_what_it_refuses(telemetry, words):

@@ -83,7 +83,7 @@ def density(
         )
     if printed and method is None:
         torque = disturbance_torque(telemetry, craft, method="transfer", model="hankel", variant=variant, axis=about)
-    elif method == "on-times" or (method is None and thrusters_firing(telemetry)):
+    elif not printed and (method == "on-times" or (method is None and thrusters_firing(telemetry))):
         torque, steps = torque_on_times(telemetry, craft, about)
     else:
         torque = disturbance_torque(telemetry, craft, method=method, variant=variant, axis=about)

@@ -16,6 +16,7 @@ from ..kit.errors import BadInput
 from ..telemetry.telemetry import Telemetry
 from .on_times import THRUST_SHARE, Gained, gained
 from .result import AXES, TorqueResult
+from .subject import thrusters_firing
 
 _FEWEST, _LONGEST = 20, 2000  # steps, knots
 _DRAWS = 300
@@ -45,6 +46,12 @@ def torque_on_times(telemetry: Telemetry, craft: Craft, axis: str) -> tuple[Torq
     """About one axis, with its posterior's draws, and the steps it is from; the impulse between samples is in ``settings``.
 
     Raises BadInput where ``gained`` does, and for a record too short or too long."""
+    if not thrusters_firing(telemetry):
+        raise BadInput(
+            "no thruster fires in this record, so on-times tell nothing",
+            file=telemetry.source or None,
+            remedy="Use --method fused.",
+        )
     g = gained(telemetry, craft, axis)
     if len(g.impulse_Nms) < _FEWEST:
         raise BadInput(
