@@ -82,7 +82,17 @@ def test_law_a_bent_path_is_followed():
     energy = 0.5 * path.speed(fine) ** 2 - mu / path.distance(fine)
     assert energy == pytest.approx(np.full(97, 0.5 * v0**2 - mu / r0), rel=2e-4)
     assert abs(path.closest_s) < 0.01 and path.altitude_m == pytest.approx(1e6, abs=1)
-    assert path.altitude(300.0) < flyby_called("Titan").altitude(300.0) - 5e3  # gravity bends it towards the body
+    kepler = flyby_called("Titan")  # the same in closed form
+    assert path.altitude(fine) == pytest.approx(kepler.altitude(fine), abs=2)  # m
+    assert path.speed(fine) == pytest.approx(kepler.speed(fine), rel=2e-5)
+    assert path.climb_rate(fine) == pytest.approx(kepler.climb_rate(fine), abs=1)
+    assert path.position(fine, (0, 1, 0), (0, 0, 3)) == pytest.approx(
+        kepler.position(fine, (0, 1, 0), (0, 0, 3)), abs=5
+    )
+    straight_m = np.hypot(r0, v0 * 250) - 2575e3
+    assert straight_m - kepler.altitude(250.0) == pytest.approx(
+        20.56e3, abs=0.05e3
+    )  # gravity bends it towards the body
 
 
 # ---- from tables --------------------------------------------------------------------------------------------
@@ -187,3 +197,10 @@ def test_kernels_give_the_path_they_hold(tmp_path):
     with pytest.raises(BadInput, match="do not give CASSINI"):
         trajectory_from_kernels(kernels, "CASSINI", "Enceladus", closest_ns + 10**13)
     assert load_craft("cassini").name.upper() == "CASSINI"
+
+
+def test_a_speed_too_low_to_pass_is_refused():
+    from dataclasses import replace
+
+    with pytest.raises(BadInput, match="stays with it"):
+        replace(flyby_called("Titan"), speed_m_s=2000.0).altitude(0.0)

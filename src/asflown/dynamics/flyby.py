@@ -3,7 +3,7 @@
 Beside Enceladus stands Titan with an exponential atmosphere, whose figures are assumed.
 
 Time counts from closest approach.  Gravity bends the path by 2 mu / (v^2 r): 2.3e-4 rad for E3, 1e-3 for the slow E9; over
-the minute in which a plume acts the place is off by some 100 m.
+the minute in which a plume acts the place is off by some 100 m.  Past Titan it is 0.14 rad, and the path a hyperbola.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from .atmosphere import Exponential
 from .environment import magnetic_torque_bound
 
 _BODIES = ("enceladus", "titan")
+_ROUNDS = 8  # of Newton's method
 
 
 @dataclass(frozen=True)
@@ -68,9 +69,14 @@ class Flyby:
         """Least distance from the moon's centre."""
         return self.moon.radius_m + self.altitude_m
 
+    def path(self, time_s) -> tuple[np.ndarray, np.ndarray]:
+        """From the moon's centre: along the vertical of closest approach, and along the velocity there. [m]"""
+        along = self.speed_m_s * np.asarray(time_s, float)
+        return np.full(along.shape, self.closest_m), along
+
     def distance(self, time_s) -> np.ndarray:
         """From the moon's centre. [m]"""
-        return np.hypot(self.closest_m, self.speed_m_s * np.asarray(time_s, float))
+        return np.hypot(*self.path(time_s))
 
     def altitude(self, time_s) -> np.ndarray:
         """Above the moon's sphere. [m]   004 section V: 322.3 km at +34 s of E3"""
@@ -103,7 +109,7 @@ class Flyby:
                 f"the latitude of {self.name}'s closest approach is not known, and a jet's distance needs it",
                 remedy="Use a flyby of Table 1 (E3, E4, E9).",
             )
-        out, along = self.closest_m, self.speed_m_s * np.asarray(time_s, float)
+        out, along = self.path(time_s)
         south = self.latitude_south_rad
         return np.stack(
             [out * np.cos(south) - along * np.sin(south), out * np.sin(south) + along * np.cos(south)], axis=-1
@@ -120,8 +126,41 @@ class Flyby:
                 "at closest approach the velocity is perpendicular to the vertical, and these two directions are not",
                 remedy="Give both in body axes: from the moon's centre to the craft at closest approach, and where it flies.",
             )
-        along = self.speed_m_s * np.asarray(time_s, float)
-        return self.closest_m * up + along[..., None] * velocity
+        out, along = self.path(time_s)
+        return out[..., None] * up + along[..., None] * velocity
+
+
+class Hyperbola(Flyby):
+    """A flyby whose path the moon's gravity bends; ``speed_m_s`` is that of closest approach.
+
+    M = e sinh F - F,  r = a (e cosh F - 1), with a = mu / v_infinity^2 and e = 1 + r_0 / a (Kepler)."""
+
+    @property
+    def _axis_m(self) -> float:
+        excess = self.speed_m_s**2 - 2 * self.moon.mu_m3_s2 / self.closest_m
+        if excess <= 0:
+            raise BadInput(
+                f"at {self.speed_m_s:g} m/s a craft does not pass {self.moon.name} but stays with it",
+                remedy=f"Give a speed above {np.sqrt(2 * self.moon.mu_m3_s2 / self.closest_m):.0f} m/s.",
+            )
+        return self.moon.mu_m3_s2 / excess
+
+    def path(self, time_s) -> tuple[np.ndarray, np.ndarray]:
+        a = self._axis_m
+        e = 1 + self.closest_m / a
+        mean = np.sqrt(self.moon.mu_m3_s2 / a**3) * np.asarray(time_s, float)
+        F = np.arcsinh(mean / e)
+        for _ in range(_ROUNDS):
+            F = F - (e * np.sinh(F) - F - mean) / (e * np.cosh(F) - 1)
+        return a * (e - np.cosh(F)), a * np.sqrt(e**2 - 1) * np.sinh(F)
+
+    def speed(self, time_s) -> np.ndarray:
+        falls = 2 * self.moon.mu_m3_s2 * (1 / self.distance(time_s) - 1 / self.closest_m)
+        return np.sqrt(self.speed_m_s**2 + falls)
+
+    def climb_rate(self, time_s) -> np.ndarray:
+        across = self.closest_m * self.speed_m_s / self.distance(time_s)
+        return np.sign(time_s) * np.sqrt(np.maximum(self.speed(time_s) ** 2 - across**2, 0.0))
 
 
 @dataclass(frozen=True)
@@ -194,9 +233,10 @@ def published_peaks() -> tuple[PublishedPeak, ...]:
 
 
 def _flyby(row: dict, passed: Moon) -> Flyby:
+    kind = Flyby if passed.atmosphere is None else Hyperbola
     noticed = [quantity(t, "s") for t in row.get("noticed", ())]
     south, west = (quantity(row[k], "rad") if k in row else None for k in ("latitude_south", "longitude_west"))
-    return Flyby(
+    return kind(
         row["name"], passed, quantity(row["altitude"], "m"), quantity(row["speed"], "m/s"), south, west,
         row.get("date", ""), (noticed[0], noticed[1]) if noticed else None, row["source"],
     )  # fmt: skip

@@ -75,7 +75,8 @@ def passed(p: Passage, now: CraftAt, start_s: float, stop_s: float) -> Passed:
     t = np.arange(start_s, stop_s + _STEP_S, _STEP_S)
     since = t - p.closest_approach
     rho = _density(p, where, since)
-    torque = rho[:, None] * per_density
+    swept = (where.speed(since) / where.speed_m_s) ** 2  # the torque per density is that of closest approach
+    torque = (rho * swept)[:, None] * per_density
     if p.gravity_gradient:
         r = where.position(since, p.up, p.velocity)
         moment = np.cross(r, r @ now.inertia_kgm2)
