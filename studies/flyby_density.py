@@ -18,6 +18,7 @@ from asflown.estimate.density import density
 from asflown.sim.fly import fly
 
 HELD = {"velocity_B": (0, 1, 0), "up_B": (1, 0, 0)}
+_STEP = 1 / 12**0.5  # s: a peak is found on instants a second apart
 KINDS = {
     "E3, exponent 1": ("e3", 180.0, {}),
     "E4, exponent 1": ("e4", 180.0, {}),
@@ -41,7 +42,14 @@ def row(craft, scenario: str, closest_s: float, gas: dict, seed: int):
     off, late = r.peak.density_kgm3 - rho, r.peak.time_s + closest_s - at
     rms = np.sqrt(np.mean((r.density_kgm3 - truth)[inside] ** 2)) / rho
     pull = np.sqrt(np.mean(((r.density_kgm3 - truth) / r.sigma_shape_kgm3)[inside] ** 2))
-    found = [100 * off / rho, late, 100 * rms, off / r.peak.sigma_shape_kgm3, late / r.peak.sigma_time_s, pull]
+    found = [
+        100 * off / rho,
+        late,
+        100 * rms,
+        off / r.peak.sigma_shape_kgm3,
+        late / max(r.peak.sigma_time_s, _STEP),
+        pull,
+    ]
     if r.atmosphere is not None:
         a, truth_m = r.atmosphere, f.met.flyby.moon.atmosphere
         found += [
