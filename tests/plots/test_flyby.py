@@ -10,7 +10,7 @@ from asflown.dynamics.flyby import flyby_called
 from asflown.estimate.density import density
 from asflown.estimate.jets import jets
 from asflown.plots.figure import new_figure, save_figures
-from asflown.plots.flyby import draw_geometry, flyby_figures
+from asflown.plots.flyby import draw_from_pole, draw_geometry, flyby_figures
 from asflown.sim.fly import fly
 from cli.program import complaint, run
 
@@ -28,11 +28,11 @@ def test_the_set_is_whole(tmp_path):
     telemetry, result = met()
     fitted = jets(telemetry, CASSINI, "E3", 180.0, widths="common", method="momentum")
     figures = flyby_figures(result, telemetry, CASSINI, fitted)
-    assert set(figures) == ALWAYS | {"geometry", "components", "model"}
+    assert set(figures) == ALWAYS | {"geometry", "geometry-pole", "components", "model"}
     for path in save_figures(figures, tmp_path):
         text = path.read_text()
         assert text.startswith("<?xml") and "E3" in text
-        assert "time from closest approach" in text or path.stem == "geometry"
+        assert "time from closest approach" in text or path.stem.startswith("geometry")
     axes = figures["attitude-error"].axes[0]
     assert axes.get_xlim() == (-60, 180) and 0.15 < axes.get_ylim()[1] < 0.4  # mrad
 
@@ -61,6 +61,19 @@ def test_law_geometry_is_to_scale_and_points_lie_where_the_altitudes_say():
     assert [np.hypot(*s) for s in sources] == pytest.approx([252.3] * 3, abs=0.01)
 
 
+def test_law_sources_and_path_from_the_pole():
+    """Offsets of 004 Table 2 are distances from the path's line: Damascus 0.4 km, Alexandria 17.7 (its arc; the chord is 17.6)."""
+    _, result = met()
+    _, (ax,) = new_figure()
+    draw_from_pole(result, ax)
+    lines = {line.get_label(): line.get_xydata() for line in ax.lines}
+    path = lines["trajectory E3"]
+    along = (path[-1] - path[0]) / np.linalg.norm(path[-1] - path[0])
+    off = {n: abs(float(np.linalg.det([along, lines[n][0] - path[0]]))) for n in ("Alexandria", "Cairo", "Damascus")}
+    assert off == pytest.approx({"Alexandria": 17.57, "Cairo": 11.58, "Damascus": 0.41}, abs=0.02)  # km
+    assert np.degrees(np.arctan2(path[0][1], path[0][0])) == pytest.approx(135, abs=1e-6)
+
+
 def test_the_verb_writes_the_set_or_refuses(tmp_path):
     assert run("simulate", "e4", "--out", tmp_path).code == 0
     words = (
@@ -74,6 +87,6 @@ def test_the_verb_writes_the_set_or_refuses(tmp_path):
         "momentum",
     )
     done = run(*words, "--plot-dir", tmp_path / "figures")
-    assert done.code == 0 and done.err.count("wrote") == 7
-    assert {p.stem for p in (tmp_path / "figures").iterdir()} == ALWAYS | {"geometry"}
+    assert done.code == 0 and done.err.count("wrote") == 8
+    assert {p.stem for p in (tmp_path / "figures").iterdir()} == ALWAYS | {"geometry", "geometry-pole"}
     complaint(*words, "--plot-dir", tmp_path / "telemetry.csv")

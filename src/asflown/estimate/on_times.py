@@ -120,9 +120,8 @@ def _noise(chain: Chain) -> float:
     third = s[:-2] - 2 * s[1:-1] + s[2:]
     still = quiet[:-2] & quiet[1:-1] & quiet[2:]
     third = third[still] if still.sum() >= _FEWEST_RUNS else third
-    least = _LEAST * float(
-        np.abs(np.cumsum(s)).max()
-    )  # a record without noise has rounding, and its matrices need some
+    # a record without noise has rounding, and the matrices made of it need some
+    least = _LEAST * float(np.abs(np.cumsum(s)).max())
     return max(1.4826 * float(np.median(np.abs(third))) / 20**0.5, least, 1e-9)
 
 

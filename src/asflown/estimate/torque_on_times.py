@@ -33,13 +33,16 @@ class Smoothed:
     time_s: np.ndarray
     torque_Nm: np.ndarray
     unknowns: np.ndarray
-    covariance: np.ndarray  # (M + m, M + m)
+    root: np.ndarray  # (M + m, M + m), of the covariance: root^T root
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Of torque and unknowns, (M + m, M + m)."""
+        return self.root.T @ self.root
 
     def draws(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """Torques from the posterior, (count, M)."""
-        M = len(self.time_s)
-        factor = np.linalg.cholesky(self.covariance[:M, :M] + 1e-24 * np.eye(M))
-        return self.torque_Nm + rng.standard_normal((count, M)) @ factor.T
+        return self.torque_Nm + rng.standard_normal((count, len(self.root))) @ self.root[:, : len(self.time_s)]
 
 
 def torque_on_times(telemetry: Telemetry, craft: Craft, axis: str) -> tuple[TorqueResult, Gained]:
@@ -117,7 +120,7 @@ def smoothed(g: Gained) -> Smoothed:
         square = (D @ x[:count]) ** 2 + np.sum((root[:, :count] @ D.T) ** 2, axis=0)
         variance = np.maximum(near @ square, _LEAST * square.max())
     x, root = posterior(variance)
-    return Smoothed(knots, x[:count], x[count:], root.T @ root)
+    return Smoothed(knots, x[:count], x[count:], root)
 
 
 def _nearby(count: int, reach: float) -> np.ndarray:

@@ -1,6 +1,6 @@
 """The set of figures of one flyby: geometry to scale, what the telemetry shows, torque, momentum, density, jets.
 
-After 004: geometry is its Figure 10, attitude and rate errors its 4, 5, A3, C2 and C3, body rates A2, torque 6 and 8, momentum 7,
+After 004: geometry is its Figures 9 (from the pole) and 10, attitude and rate errors its 4, 5, A3, C2 and C3, body rates A2, torque 6 and 8, momentum 7,
 components 11, model and reconstruction 12.  Time is from closest approach.
 """
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from ..craft.model import Craft
 from ..dynamics.plume import as_passed, published_jets
+from ..dynamics.trajectory import Trajectory
 from ..estimate.density_result import DensityResult
 from ..estimate.external_samples import samples_of
 from ..estimate.jets_result import JetsResult
@@ -34,6 +35,8 @@ def flyby_figures(result: DensityResult, telemetry: Telemetry, craft: Craft, jet
     figures = {}
     if result.flyby.latitude_south_rad is not None:
         figures["geometry"] = _alone(draw_geometry, result, height=5.6, width=7.2)
+    if result.flyby.longitude_west_rad is not None:
+        figures["geometry-pole"] = _alone(draw_from_pole, result, height=5.4, width=6.6)
     for stem, (name, label, scale) in _READINGS.items():
         if telemetry.has_axes(stem):
             figure, (ax,) = new_figure(1, height=3.4)
@@ -123,6 +126,41 @@ def draw_geometry(result: DensityResult, ax):
     return ax
 
 
+def draw_from_pole(result: DensityResult, ax):
+    """The south pole's surroundings seen from the south, to scale: sources, and the path projected along the spin axis.  Returns ax."""
+    flyby, radius = result.flyby, result.flyby.moon.radius_m / 1e3
+    turn = np.linspace(0, 2 * np.pi, 121)
+    for degrees in (10, 20, 30):
+        size = radius * np.sin(np.radians(degrees))
+        ax.plot(size * np.cos(turn), size * np.sin(turn), color=GREY, linewidth=0.6, linestyle=":")
+        ax.annotate(f"{90 - degrees}° S", (0, -size), fontsize=7, color=GREY, ha="center")
+    reach = 1.15 * radius * np.sin(np.radians(30))
+    for west in range(0, 360, 45):
+        way = np.array([np.cos(np.radians(west)), np.sin(np.radians(west))])
+        ax.plot(*np.outer(way, [0, reach]), color=GREY, linewidth=0.4)
+        ax.annotate(f"{west}° W", 1.04 * reach * way, fontsize=7, color=GREY, ha="center", va="center")
+    start, stop = (result.noticed_s or (-60.0, 60.0)) if flyby.noticed_s is None else flyby.noticed_s
+    path = _from_south(flyby, np.linspace(start - 60, stop + 60, 400))
+    inside = np.hypot(*path.T) <= reach
+    ax.plot(*path[inside].T, color=BLUE, linewidth=1.6, label=f"trajectory {flyby.name}")
+    if flyby.moon.atmosphere is None:
+        for jet, color in zip(published_jets(), (GREEN, ORANGE, PURPLE), strict=True):
+            west, out = jet.longitude_west_rad, radius * np.cos(jet.latitude_south_rad)
+            ax.plot(out * np.cos(west), out * np.sin(west), "o", color=color, markersize=6, label=jet.name)
+    peak = _from_south(flyby, result.peak.time_s)
+    if np.hypot(*peak) <= reach:
+        ax.plot(*peak, "o", color=RED, markersize=5)
+        ax.annotate(
+            f"Q, {result.peak.time_s:+.0f} s", peak, xytext=(7, 4), textcoords="offset points", fontsize=9, color=RED
+        )
+    ax.set_aspect("equal")
+    ax.set_xlabel("towards 0° W [km]")
+    ax.set_ylabel("towards 90° W [km]")
+    ax.set_title(f"{flyby.name} from below the south pole of {flyby.moon.name}", loc="left", fontsize=11)
+    ax.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return ax
+
+
 def draw_readings(telemetry: Telemetry, stem: str, closest_s: float, ax, scale: float):
     """A family of channels about the three axes.  Returns ax."""
     for axis, color in zip(AXES, BY_AXIS, strict=True):
@@ -169,6 +207,14 @@ def _points(result: DensityResult) -> dict[str, float]:
 def _projected(flyby, time_s) -> np.ndarray:
     """Out of the spin axis and north, (..., 2). [km]"""
     return flyby.in_plane(time_s) * np.array([1e-3, -1e-3])
+
+
+def _from_south(flyby, time_s) -> np.ndarray:
+    """Towards 0 and towards 90 degrees west, (..., 2). [km]"""
+    if isinstance(flyby, Trajectory):
+        return flyby.place(time_s)[..., :2] * np.array([1e-3, -1e-3])
+    west = flyby.longitude_west_rad
+    return flyby.in_plane(time_s)[..., :1] * np.array([np.cos(west), np.sin(west)]) / 1e3
 
 
 def _ray(source, along, length: float):
