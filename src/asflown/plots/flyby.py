@@ -145,8 +145,8 @@ def draw_from_pole(result: DensityResult, ax):
     ax.plot(*path[inside].T, color=BLUE, linewidth=1.6, label=f"trajectory {flyby.name}")
     if flyby.moon.atmosphere is None:
         for jet, color in zip(published_jets(), (GREEN, ORANGE, PURPLE), strict=True):
-            west, out = jet.longitude_west_rad, radius * np.cos(jet.latitude_south_rad)
-            ax.plot(out * np.cos(west), out * np.sin(west), "o", color=color, markersize=6, label=jet.name)
+            w, out = jet.longitude_west_rad, radius * np.cos(jet.latitude_south_rad)
+            ax.plot(out * np.cos(w), out * np.sin(w), "o", color=color, markersize=6, label=jet.name)
     peak = _from_south(flyby, result.peak.time_s)
     if np.hypot(*peak) <= reach:
         ax.plot(*peak, "o", color=RED, markersize=5)
