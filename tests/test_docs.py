@@ -73,7 +73,7 @@ def test_telemetry_pages_examples_are_read(tmp_path):
 
 
 def test_simulator_page_lists_every_scenario_key():
-    models = (scenario.Scenario, scenario.Triangles, scenario.Constant, scenario.Table, scenario.Plume, scenario.Slew,
+    models = (scenario.Scenario, scenario.Triangles, scenario.Constant, scenario.Table, scenario.Plume, scenario.Passage, scenario.Slew,
               scenario.Coast, scenario.DragSpike, scenario.CoverMotion, scenario.Controller, scenario.Sampling, scenario.Gap,
               scenario.ThrusterUse, scenario.CatalystBeds, scenario.ThrusterFault, scenario.WheelBias, scenario.Burn)  # fmt: skip
     tables = {
@@ -84,6 +84,7 @@ def test_simulator_page_lists_every_scenario_key():
         "controller",
         "telemetry",
         "gaps",
+        "flyby",
         "thrusters",
         "catalyst_beds",
         "thruster_faults",

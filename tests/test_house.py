@@ -10,14 +10,14 @@ import pytest
 SRC = Path(__file__).resolve().parents[1] / "src" / "asflown"
 
 #: Room -> rooms it may import from.  sim and dynamics stand side by side: the one integrates, the other
-#: inverts, and a mistake in either must show against the other.
+#: inverts, and a mistake in either must show against the other.  They share only the world that is flown through.
 MAY_IMPORT = {
     "kit": set(),
     "craft": {"kit"},
     "telemetry": {"kit", "craft"},
     "maneuvers": {"kit", "telemetry"},
     "dynamics": {"kit", "craft"},
-    "sim": {"kit", "craft", "telemetry", "maneuvers"},
+    "sim": {"kit", "craft", "telemetry", "maneuvers", "dynamics"},
     "estimate": {"kit", "craft", "telemetry", "maneuvers", "dynamics"},
     "plots": {"kit", "craft", "telemetry", "maneuvers", "dynamics", "estimate", "trends"},
     "trends": {"kit", "craft", "telemetry", "dynamics", "estimate"},
@@ -63,6 +63,15 @@ def test_every_room_is_known():
 @pytest.mark.parametrize("room", MAY_IMPORT)
 def test_imports_follow_the_data(room):
     assert imports_of(room) <= MAY_IMPORT[room]
+
+
+def test_sim_takes_no_more_of_dynamics_than_the_world_flown_through():
+    taken = set()
+    for path in (SRC / "sim").glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and node.level == 2 and (node.module or "").startswith("dynamics"):
+                taken.add(node.module.removeprefix("dynamics."))
+    assert taken == {"flyby", "plume", "drag"}
 
 
 def test_help_loads_nothing_heavy():

@@ -16,7 +16,7 @@ from cli.program import complaint, run
 
 CASSINI = load_craft("cassini")
 CLOSEST_S = 180.0
-#: The simulator's jets fade from 1260 km on, 99 s after closest approach: the record ends there.
+#: The record ends 1260 km from the jets, 99 s after closest approach: well within eq 26's reach.
 STOP_S = CLOSEST_S + 98
 TRUTH = {"Alexandria": 0.55e-12, "Cairo": 10.3e-12, "Damascus": 8.5e-12}  # 004 Table 3; all 0.36 rad wide
 

@@ -9,9 +9,9 @@ from asflown.estimate.gates_fit import fit_gates
 from asflown.estimate.gates_judge import judge_gates
 from asflown.estimate.gates_watch import watch_maneuvers
 from asflown.maneuvers.history import past_model
-from asflown.plots.figure import new_figure
+from asflown.plots.figure import new_figure, save_figures
 from asflown.plots.labels import label_points
-from asflown.plots.maneuvers import degradation_figure, gates_figures, save_figures, watch_figure
+from asflown.plots.maneuvers import degradation_figure, gates_figures, watch_figure
 from asflown.sim.maneuver_sets import RCS_SET, a_branch, execute
 
 RCS = past_model("rcs/2012-1").model

@@ -8,7 +8,6 @@ from typer.testing import CliRunner
 
 from asflown.kit.errors import BadInput
 from asflown.sim.command import commanded_motion, slew_time
-from asflown.sim.disturbances import TORQUE_PER_DENSITY, plume_density
 from asflown.sim.fly import fly, write_flight
 from asflown.sim.scenario import load_scenario, shipped_scenarios
 
@@ -84,16 +83,6 @@ def test_law_commanded_motion_is_consistent():
     assert np.abs(w).max() == pytest.approx(2e-3) and np.all(w[-1] == 0) and np.all(w[0] == 0)
     for slew in slews:
         assert slew_time(slew) == pytest.approx(100 + np.radians(25) / 2e-3)
-
-
-def test_published_plume_density_along_enceladus_3():
-    """004 Table 3 in eqs 23-27: 6.26e-12 kg/m3 at +34 s, 6.48e-12 at the crossing of Cairo's axis, +39.3 s."""
-    t = np.arange(10, 130, 0.05)
-    rho = plume_density(t)
-    assert np.interp(34, t, rho) == pytest.approx(6.26e-12, abs=0.01e-12)
-    assert rho.max() == pytest.approx(6.48e-12, abs=0.01e-12)
-    assert t[np.argmax(rho)] == pytest.approx(39.3, abs=0.1)
-    assert pytest.approx(0.5 * 2.1 * 14410**2 * 18.401 * 0.853, rel=1e-4) == TORQUE_PER_DENSITY
 
 
 def test_law_the_plume_takes_momentum_away():

@@ -6,13 +6,27 @@ from pathlib import Path
 
 import typer
 
-from .flyby_options import AREA, ARM, AXIS, CLOSEST, FLYBY, METHOD, UP, VELOCITY, drag_from
+from .flyby_options import (
+    AREA,
+    ARM,
+    AXIS,
+    CLOSEST,
+    FLYBY,
+    KERNELS,
+    METHOD,
+    TRAJECTORY,
+    UP,
+    VELOCITY,
+    drag_from,
+    flyby_from,
+)
 from .options import (
     CHANNELS,
     CRAFT,
     EXCLUDE,
     INERTIA,
     JSON,
+    PLOT_DIR,
     START,
     STOP,
     check_picture,
@@ -37,33 +51,46 @@ def density(
     arm: str = ARM,
     velocity: str = VELOCITY,
     up: str = UP,
+    trajectory: Path = TRAJECTORY,
+    kernels: list[Path] = KERNELS,
     start: str = START,
     stop: str = STOP,
     channels: Path = CHANNELS,
     exclude: Path = EXCLUDE,
     inertia: str = INERTIA,
     plot: Path = typer.Option(None, "--plot", help="Draw the density (SVG, PNG or PDF by its suffix)."),
+    plot_dir: Path = PLOT_DIR,
     json: bool = JSON,
 ) -> None:
     """Density of the gas that a craft meets in a flyby, from the torque it exerts."""
     from asflown.estimate.density import density as density_of
+    from asflown.kit.files import check_folder
 
     check_picture(plot)
+    if plot_dir is not None:
+        check_folder(plot_dir)
     ship = craft_from(craft, inertia, None)
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
+    path, of_path = flyby_from(flyby, closest_approach, trajectory, kernels, telemetry, ship)
     drag = drag_from(axis, method, area, arm, velocity, up)
-    result = density_of(telemetry, ship, flyby, closest_approach, variant=variant, **drag)
+    result = density_of(telemetry, ship, path, closest_approach, variant=variant, **drag)
     if plot is not None:
         from asflown.plots.density import save_density_figure
 
         save_density_figure(result, plot)
         say(f"wrote {plot}")
+    if plot_dir is not None:
+        from asflown.plots.figure import save_figures
+        from asflown.plots.flyby import flyby_figures
+
+        for path in save_figures(flyby_figures(result, telemetry, ship), plot_dir):
+            say(f"wrote {path}")
     if json:
         options = {"craft": craft, "flyby": result.flyby.name, "closest_approach": closest_approach, "axis": result.axis,
                    "method": result.method, "variant": variant, "area": area, "arm": arm, "velocity": velocity, "up": up,
-                   "start": start, "stop": stop, "inertia": inertia}  # fmt: skip
+                   "trajectory": trajectory, "kernels": kernels, "start": start, "stop": stop, "inertia": inertia}  # fmt: skip
         record = {"command": "density"} | result.record()
-        print_json(record | {"provenance": provenance(inputs | hashes(craft), options)})
+        print_json(record | {"provenance": provenance(inputs | of_path | hashes(craft), options)})
         return
     print(result)
     print_doubts(result.doubts)

@@ -4,18 +4,64 @@ from __future__ import annotations
 
 import typer
 
-FLYBY = typer.Option(..., "--flyby", help="Of Enceladus: E3, E4, E5 or E9.")
+FLYBY = typer.Option(..., "--flyby", help="Of Enceladus: E3, E4, E5 or E9; or Titan.")
 CLOSEST = typer.Option(..., "--closest-approach", help="UTC, or seconds from the file's epoch.")
 AXIS = typer.Option(
     None, "--axis", help="About which gas turns the craft: x, y or z; that of the craft's arm unless given."
 )
-METHOD = typer.Option(None, "--method", help="Of the torque: fused (default), momentum, transfer, polynomial.")
+METHOD = typer.Option(
+    None,
+    "--method",
+    help="Of the torque: fused (default), momentum, transfer, polynomial; on-times where thrusters fire.",
+)
 AREA = typer.Option(None, "--area", help='Projected area, as in "18.4 m2"; the craft\'s unless given.')
 ARM = typer.Option(None, "--arm", help='Moment arm, as in "0.85 m"; the craft\'s unless given.')
 VELOCITY = typer.Option(
     None, "--velocity", help='Direction of flight "x,y,z" in body axes; with --up takes the gravity gradient off.'
 )
 UP = typer.Option(None, "--up", help='From the moon to the craft at closest approach, "x,y,z" in body axes.')
+TRAJECTORY = typer.Option(
+    None, "--trajectory", help="CSV of time, position and velocity from the body's centre, instead of a straight line."
+)
+KERNELS = typer.Option(
+    None, "--kernels", help="SPICE kernels, or a metakernel, instead of a straight line (needs spiceypy)."
+)
+
+
+def flyby_from(name: str, closest: str, trajectory, kernels, telemetry, craft):
+    """The flyby that --flyby names, along a trajectory where one is given; and its inputs' SHA-256."""
+    from asflown.dynamics.flyby import flyby_called
+    from asflown.dynamics.trajectory import Trajectory
+    from asflown.kit.errors import BadInput
+    from asflown.kit.timeline import NS
+
+    flyby = flyby_called(name)
+    if trajectory is None and not kernels:
+        return flyby, {}
+    if trajectory is not None and kernels:
+        raise BadInput("--trajectory and --kernels both give the path", remedy="Give one of them.")
+    closest_ns = telemetry.moment(closest)
+    if trajectory is not None:
+        from asflown.telemetry.trajectory import load_trajectory
+
+        table, source = load_trajectory(trajectory), str(trajectory)
+    else:
+        from asflown.telemetry.kernels import trajectory_from_kernels
+
+        source = ", ".join(map(str, kernels))
+        table = trajectory_from_kernels(kernels, craft.name.upper(), flyby.moon.name, closest_ns)
+    if table.dated and not telemetry.dated:
+        raise BadInput(
+            "the trajectory has dates and the telemetry has none",
+            file=source,
+            remedy="Give the trajectory's time in seconds from closest approach, without an epoch.",
+        )
+    time_s = (table.tai_ns - (closest_ns if table.dated else 0)) / NS
+    try:
+        path = Trajectory.along(flyby, time_s, table.position_m, table.velocity_m_s)
+    except BadInput as why:
+        raise why.within(source) from None
+    return path, {source: table.sha256}
 
 
 def drag_from(axis, method, area, arm, velocity, up) -> dict:

@@ -9,8 +9,8 @@ import typer
 from .gates_simulate import simulate
 from .gates_watch import predict, watch
 from .groups import FitUnlessNamed
-from .maneuver_options import AGAINST, ENGINE, FILE, PLOT_DIR, WITHOUT, held, maneuvers_from, past_named, removed_bias
-from .options import CRAFT, JSON, KEEP_AS, KEEP_IN, craft_from, hashes
+from .maneuver_options import AGAINST, ENGINE, FILE, WITHOUT, held, maneuvers_from, past_named, removed_bias
+from .options import CRAFT, JSON, KEEP_AS, KEEP_IN, PLOT_DIR, craft_from, hashes
 from .output import keep, print_doubts, print_json, provenance, say
 
 app = typer.Typer(
@@ -97,7 +97,8 @@ def fit(
 
         keep(store, gates_entry(result, craft_from(craft, None, None), name, record["provenance"]))
     if plot_dir is not None:
-        from asflown.plots.maneuvers import gates_figures, save_figures
+        from asflown.plots.figure import save_figures
+        from asflown.plots.maneuvers import gates_figures
 
         for path in save_figures(gates_figures(result, judged), plot_dir):
             say(f"wrote {path}")

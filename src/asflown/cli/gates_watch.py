@@ -6,8 +6,8 @@ from pathlib import Path
 
 import typer
 
-from .maneuver_options import AGAINST, ENGINE, FILE, PLOT_DIR, WITHOUT, maneuvers_from, past_named
-from .options import JSON, hashes
+from .maneuver_options import AGAINST, ENGINE, FILE, WITHOUT, maneuvers_from, past_named
+from .options import JSON, PLOT_DIR, hashes
 from .output import print_doubts, print_json, provenance, say
 
 
@@ -31,7 +31,8 @@ def watch(
     result = watch_maneuvers(burns, first=first, against=past_named(against, burns.engine[0]), false_alarm=false_alarm)
     options = {"engine": engine, "from": first, "against": against, "false_alarm": false_alarm, "without": without}
     if plot_dir is not None:
-        from asflown.plots.maneuvers import degradation_figure, save_figures, watch_figure
+        from asflown.plots.figure import save_figures
+        from asflown.plots.maneuvers import degradation_figure, watch_figure
 
         for path in save_figures(
             {"watch": watch_figure(result), "degradation": degradation_figure(result, burns)}, plot_dir

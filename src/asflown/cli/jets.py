@@ -6,13 +6,27 @@ from pathlib import Path
 
 import typer
 
-from .flyby_options import AREA, ARM, AXIS, CLOSEST, FLYBY, METHOD, UP, VELOCITY, drag_from
+from .flyby_options import (
+    AREA,
+    ARM,
+    AXIS,
+    CLOSEST,
+    FLYBY,
+    KERNELS,
+    METHOD,
+    TRAJECTORY,
+    UP,
+    VELOCITY,
+    drag_from,
+    flyby_from,
+)
 from .options import (
     CHANNELS,
     CRAFT,
     EXCLUDE,
     INERTIA,
     JSON,
+    PLOT_DIR,
     START,
     STOP,
     check_picture,
@@ -38,36 +52,49 @@ def jets(
     arm: str = ARM,
     velocity: str = VELOCITY,
     up: str = UP,
+    trajectory: Path = TRAJECTORY,
+    kernels: list[Path] = KERNELS,
     start: str = START,
     stop: str = STOP,
     channels: Path = CHANNELS,
     exclude: Path = EXCLUDE,
     inertia: str = INERTIA,
     plot: Path = typer.Option(None, "--plot", help="Draw jets and density (SVG, PNG or PDF by its suffix)."),
+    plot_dir: Path = PLOT_DIR,
     json: bool = JSON,
 ) -> None:
     """Densities and widths of a plume's jets, from the momentum they gave a craft; what the telemetry does not tell is said."""
     from asflown.estimate.jets import jets as fitted_jets
+    from asflown.kit.files import check_folder
 
     check_picture(plot)
+    if plot_dir is not None:
+        check_folder(plot_dir)
     ship = craft_from(craft, inertia, None)
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
+    path, of_path = flyby_from(flyby, closest_approach, trajectory, kernels, telemetry, ship)
     drag = drag_from(axis, method, area, arm, velocity, up)
     names = None if sources is None else [n.strip().capitalize() for n in sources.split(",")]
     result = fitted_jets(
-        telemetry, ship, flyby, closest_approach, names=names, widths=widths, power=power, angle=angle, **drag
+        telemetry, ship, path, closest_approach, names=names, widths=widths, power=power, angle=angle, **drag
     )
     if plot is not None:
         from asflown.plots.density import save_jets_figure
 
         save_jets_figure(result, plot)
         say(f"wrote {plot}")
+    if plot_dir is not None:
+        from asflown.plots.figure import save_figures
+        from asflown.plots.flyby import flyby_figures
+
+        for path in save_figures(flyby_figures(result.density, telemetry, ship, result), plot_dir):
+            say(f"wrote {path}")
     if json:
         options = {"craft": craft, "flyby": result.density.flyby.name, "closest_approach": closest_approach, "axis": axis, "method": method,
                    "sources": sources, "widths": widths, "power": power, "angle": angle, "area": area, "arm": arm, "velocity": velocity,
-                   "up": up, "start": start, "stop": stop, "inertia": inertia}  # fmt: skip
+                   "up": up, "trajectory": trajectory, "kernels": kernels, "start": start, "stop": stop, "inertia": inertia}  # fmt: skip
         record = {"command": "jets"} | result.record()
-        print_json(record | {"provenance": provenance(inputs | hashes(craft), options)})
+        print_json(record | {"provenance": provenance(inputs | of_path | hashes(craft), options)})
         return
     print(result)
     print_doubts(result.doubts)

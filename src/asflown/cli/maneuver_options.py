@@ -14,7 +14,6 @@ AGAINST = typer.Option(
     "--against",
     help="A model to judge by: of the history, as in 2012-1 or rcs/2012-1, or the JSON of an earlier fit.",
 )
-PLOT_DIR = typer.Option(None, "--plot-dir", help="Draw the figures into this folder (SVG).")
 
 
 def maneuvers_from(file: Path, engine: str | None, without: str | None):

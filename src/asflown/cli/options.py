@@ -17,6 +17,7 @@ START = typer.Option(None, "--start", help="Start of the window: seconds from th
 STOP = typer.Option(None, "--stop", help="End of the window: seconds from the epoch, or UTC.")
 KEEP_IN = typer.Option(None, "--store", help="Keep the result in a trend store: a path (SQLite) or a URL.")
 KEEP_AS = typer.Option(None, "--id", help="Its name in the store; the date unless given.")
+PLOT_DIR = typer.Option(None, "--plot-dir", help="Draw the figures into this folder (SVG).")
 JSON = typer.Option(False, "--json", help="One JSON object on standard output.")
 
 

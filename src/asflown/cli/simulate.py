@@ -20,22 +20,32 @@ def simulate(
     craft: str = typer.Option(None, "--craft", help="A built-in craft or a TOML file, instead of the scenario's."),
     seed: int = typer.Option(None, "--seed", min=0, help="Another draw of the noise."),
     noise: str = typer.Option(None, "--noise", help="none, half, nominal or double."),
+    settings: list[str] = typer.Option(
+        None, "--set", help="A value of the scenario changed, as in flyby.exponent=2; may be repeated."
+    ),
     inertia: str = INERTIA,
     cm: str = CM,
     json: bool = JSON,
 ) -> None:
     """Fly a scenario in the closed loop: telemetry as a spacecraft would send it, and the truth beside it."""
+    from asflown.kit.config import changes_of
+    from asflown.kit.errors import BadInput
     from asflown.kit.files import check_folder
     from asflown.sim.fly import fly, write_flight
     from asflown.sim.mission import is_mission
     from asflown.sim.scenario import load_scenario
 
     check_folder(out)
-    options = {"craft": craft, "noise": noise, "inertia": inertia, "cm": cm}
+    options = {"craft": craft, "noise": noise, "set": settings, "inertia": inertia, "cm": cm}
+    changes = changes_of(settings or (), "--set")
     if is_mission(scenario):
+        if changes:
+            raise BadInput(
+                "--set changes a scenario, and this is a mission", remedy="Copy its TOML and change it there."
+            )
         _simulate_mission(scenario, out, seed, options, json)
         return
-    plan = load_scenario(scenario)
+    plan = load_scenario(scenario).changed(**changes)
     vehicle = craft_from(craft or plan.craft, inertia, cm)
     flight = fly(plan, craft=vehicle, seed=seed, noise=noise, progress=progress())
     files = write_flight(flight, out)

@@ -1,7 +1,9 @@
 """A flyby on a straight line at constant speed, and the flybys, jets and peaks that were published (004 Tables 1 to 4).
 
+Beside Enceladus stands Titan with an exponential atmosphere, whose figures are assumed.
+
 Time counts from closest approach.  Gravity bends the path by 2 mu / (v^2 r): 2.3e-4 rad for E3, 1e-3 for the slow E9; over
-the minute in which a plume acts the place is off by some 100 m.
+the minute in which a plume acts the place is off by some 100 m.  Past Titan it is 0.14 rad, and the path a hyperbola.
 """
 
 from __future__ import annotations
@@ -15,6 +17,11 @@ import numpy as np
 
 from ..kit.errors import BadInput, some_of
 from ..kit.quantities import quantity
+from .atmosphere import Exponential
+from .environment import magnetic_torque_bound
+
+_BODIES = ("enceladus", "titan")
+_ROUNDS = 8  # of Newton's method
 
 
 @dataclass(frozen=True)
@@ -25,6 +32,15 @@ class Moon:
     mu_m3_s2: float
     field_T: float
     field_change: float
+    name: str = "Enceladus"
+    atmosphere: Exponential | None = None  # None: what gas there is comes in jets
+
+    @property
+    def small_torques_Nm(self) -> float:
+        """Bound of what sunlight, power generators and the magnetic field do to Cassini there. [N m]   004 section V, eq 20"""
+        row = tables()["small_torques"]
+        magnetic = magnetic_torque_bound(quantity(row["dipole"], "A m2"), self.field_T, self.field_change)
+        return quantity(row["sunlight"], "N m") + quantity(row["power_generators"], "N m") + magnetic
 
 
 @dataclass(frozen=True)
@@ -44,13 +60,23 @@ class Flyby:
     source: str = ""
 
     @property
+    def doubts(self) -> tuple[str, ...]:
+        """What is not as it should be about the path: of a straight line from the tables nothing."""
+        return ()
+
+    @property
     def closest_m(self) -> float:
         """Least distance from the moon's centre."""
         return self.moon.radius_m + self.altitude_m
 
+    def path(self, time_s) -> tuple[np.ndarray, np.ndarray]:
+        """From the moon's centre: along the vertical of closest approach, and along the velocity there. [m]"""
+        along = self.speed_m_s * np.asarray(time_s, float)
+        return np.full(along.shape, self.closest_m), along
+
     def distance(self, time_s) -> np.ndarray:
         """From the moon's centre. [m]"""
-        return np.hypot(self.closest_m, self.speed_m_s * np.asarray(time_s, float))
+        return np.hypot(*self.path(time_s))
 
     def altitude(self, time_s) -> np.ndarray:
         """Above the moon's sphere. [m]   004 section V: 322.3 km at +34 s of E3"""
@@ -59,6 +85,19 @@ class Flyby:
     def climb_rate(self, time_s) -> np.ndarray:
         """d altitude / dt. [m/s]"""
         return self.speed_m_s**2 * np.asarray(time_s, float) / self.distance(time_s)
+
+    def speed(self, time_s) -> np.ndarray:
+        """Relative to the body. [m/s]"""
+        return np.full(np.shape(time_s), self.speed_m_s)
+
+    def from_source(self, jet, time_s) -> tuple[np.ndarray, np.ndarray]:
+        """Position from a jet's source (N, 3) [m] and the jet's axis (3,): the axes of ``in_plane``, and across that plane.   004 eq 23
+
+        The axis is taken to lie in the plane, as in the paper."""
+        along = np.array([np.sin(jet.tilt_rad), np.cos(jet.tilt_rad), 0.0])
+        place = self.in_plane(time_s)
+        across = np.full((*place.shape[:-1], 1), jet.offset_m)
+        return np.concatenate([place - self.moon.radius_m * along[:2], across], axis=-1), along
 
     def in_plane(self, time_s) -> np.ndarray:
         """From the moon's centre, in the plane of trajectory and spin axis: away from the axis on the side of closest
@@ -70,7 +109,7 @@ class Flyby:
                 f"the latitude of {self.name}'s closest approach is not known, and a jet's distance needs it",
                 remedy="Use a flyby of Table 1 (E3, E4, E9).",
             )
-        out, along = self.closest_m, self.speed_m_s * np.asarray(time_s, float)
+        out, along = self.path(time_s)
         south = self.latitude_south_rad
         return np.stack(
             [out * np.cos(south) - along * np.sin(south), out * np.sin(south) + along * np.cos(south)], axis=-1
@@ -87,8 +126,41 @@ class Flyby:
                 "at closest approach the velocity is perpendicular to the vertical, and these two directions are not",
                 remedy="Give both in body axes: from the moon's centre to the craft at closest approach, and where it flies.",
             )
-        along = self.speed_m_s * np.asarray(time_s, float)
-        return self.closest_m * up + along[..., None] * velocity
+        out, along = self.path(time_s)
+        return out[..., None] * up + along[..., None] * velocity
+
+
+class Hyperbola(Flyby):
+    """A flyby whose path the moon's gravity bends; ``speed_m_s`` is that of closest approach.
+
+    M = e sinh F - F,  r = a (e cosh F - 1), with a = mu / v_infinity^2 and e = 1 + r_0 / a (Kepler)."""
+
+    @property
+    def _axis_m(self) -> float:
+        excess = self.speed_m_s**2 - 2 * self.moon.mu_m3_s2 / self.closest_m
+        if excess <= 0:
+            raise BadInput(
+                f"at {self.speed_m_s:g} m/s a craft does not pass {self.moon.name} but stays with it",
+                remedy=f"Give a speed above {np.sqrt(2 * self.moon.mu_m3_s2 / self.closest_m):.0f} m/s.",
+            )
+        return self.moon.mu_m3_s2 / excess
+
+    def path(self, time_s) -> tuple[np.ndarray, np.ndarray]:
+        a = self._axis_m
+        e = 1 + self.closest_m / a
+        mean = np.sqrt(self.moon.mu_m3_s2 / a**3) * np.asarray(time_s, float)
+        F = np.arcsinh(mean / e)
+        for _ in range(_ROUNDS):
+            F = F - (e * np.sinh(F) - F - mean) / (e * np.cosh(F) - 1)
+        return a * (e - np.cosh(F)), a * np.sqrt(e**2 - 1) * np.sinh(F)
+
+    def speed(self, time_s) -> np.ndarray:
+        falls = 2 * self.moon.mu_m3_s2 * (1 / self.distance(time_s) - 1 / self.closest_m)
+        return np.sqrt(self.speed_m_s**2 + falls)
+
+    def climb_rate(self, time_s) -> np.ndarray:
+        across = self.closest_m * self.speed_m_s / self.distance(time_s)
+        return np.sign(time_s) * np.sqrt(np.maximum(self.speed(time_s) ** 2 - across**2, 0.0))
 
 
 @dataclass(frozen=True)
@@ -104,33 +176,42 @@ class PublishedPeak:
 
 
 @cache
-def tables() -> dict:
-    """The tables as they stand in the file, values with their units."""
-    return tomllib.loads((resources.files("asflown.dynamics") / "enceladus.toml").read_text(encoding="utf-8"))
+def tables(body: str = "enceladus") -> dict:
+    """The tables as they stand in a body's file, values with their units."""
+    return tomllib.loads((resources.files("asflown.dynamics") / f"{body}.toml").read_text(encoding="utf-8"))
 
 
 @cache
-def enceladus() -> Moon:
-    m = tables()["moon"]
+def moon(body: str) -> Moon:
+    m = tables(body)["moon"]
+    air = m.get("atmosphere")
     return Moon(
         quantity(m["radius"], "m"),
         quantity(m["gravitational_parameter"], "m3/s2"),
         quantity(m["field"], "T"),
         quantity(m["field_change"], ""),
-    )
+        body.capitalize(),
+        None if air is None else Exponential(
+            quantity(air["density"], "kg/m3"), quantity(air["altitude"], "m"), quantity(air["scale_height"], "m")
+        ),
+    )  # fmt: skip
+
+
+def enceladus() -> Moon:
+    return moon("enceladus")
 
 
 @cache
 def flybys() -> tuple[Flyby, ...]:
     """Every flyby of the tables."""
-    return tuple(_flyby(row) for row in tables()["flyby"])
+    return tuple(_flyby(row, moon(body)) for body in _BODIES for row in tables(body)["flyby"])
 
 
 def flyby_called(name: str) -> Flyby:
-    """'E3', 'e3' or 'enceladus-3'.  Raises BadInput for one that is not there."""
+    """'E3', 'e3', 'enceladus-3', 'Titan'.  Raises BadInput for one that is not there."""
     short = name.strip().upper().replace("ENCELADUS-", "E")
     for f in flybys():
-        if f.name == short:
+        if f.name.upper() == short:
             return f
     raise BadInput(f"{name!r} is no flyby of the tables", remedy=f"Name one of: {some_of(f.name for f in flybys())}.")
 
@@ -151,10 +232,11 @@ def published_peaks() -> tuple[PublishedPeak, ...]:
     return tuple(peaks)
 
 
-def _flyby(row: dict) -> Flyby:
+def _flyby(row: dict, passed: Moon) -> Flyby:
+    kind = Flyby if passed.atmosphere is None else Hyperbola
     noticed = [quantity(t, "s") for t in row.get("noticed", ())]
     south, west = (quantity(row[k], "rad") if k in row else None for k in ("latitude_south", "longitude_west"))
-    return Flyby(
-        row["name"], enceladus(), quantity(row["altitude"], "m"), quantity(row["speed"], "m/s"), south, west,
-        row["date"], (noticed[0], noticed[1]) if noticed else None, row["source"],
+    return kind(
+        row["name"], passed, quantity(row["altitude"], "m"), quantity(row["speed"], "m/s"), south, west,
+        row.get("date", ""), (noticed[0], noticed[1]) if noticed else None, row["source"],
     )  # fmt: skip

@@ -82,13 +82,10 @@ def seen_from(jet: Jet, flyby: Flyby, time_s, *, variant: str = "corrected", ang
     ``angle``: of the projection into the flyby's plane, as in the paper, or in ``space``, the offset counted: it has no cusp
     where the craft crosses the axis."""
     _check(variant, VARIANTS, "variant")
-    p, q = np.moveaxis(
-        flyby.in_plane(time_s) - flyby.moon.radius_m * np.array([np.sin(jet.tilt_rad), np.cos(jet.tilt_rad)]), -1, 0
-    )
-    r = np.sqrt(p**2 + q**2 + jet.offset_m**2)
+    apart, axis = flyby.from_source(jet, time_s)
+    p, q, r = apart[..., 0], apart[..., 1], np.linalg.norm(apart, axis=-1)
     if _check(angle, ANGLES, "angle") == "space":
-        along = p * np.sin(jet.tilt_rad) + q * np.cos(jet.tilt_rad)
-        return r, np.arccos(np.clip(along / np.maximum(r, 1e-9), -1, 1))
+        return r, np.arccos(np.clip(apart @ axis / np.maximum(r, 1e-9), -1, 1))
     if variant == "printed":
         with np.errstate(divide="ignore"):
             return r, np.abs(np.arctan(p / q) - jet.tilt_rad)

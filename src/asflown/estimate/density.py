@@ -18,17 +18,20 @@ import numpy as np
 
 from ..craft.model import Aerodynamics, Craft
 from ..dynamics.drag import PRINTED_E3, torque_per_density
-from ..dynamics.environment import gravity_gradient, gravity_gradient_bound, magnetic_torque_bound
-from ..dynamics.flyby import Flyby, flyby_called, published_peaks, tables
+from ..dynamics.environment import gravity_gradient, gravity_gradient_bound
+from ..dynamics.flyby import Flyby, flyby_called, published_peaks
 from ..dynamics.plume import FARTHEST_M
+from ..dynamics.trajectory import Trajectory
 from ..kit.errors import BadInput
-from ..kit.quantities import quantity
 from ..kit.timeline import utc_label
 from ..telemetry.telemetry import Telemetry
+from .atmosphere import fit_atmosphere
 from .density_result import Beside, DensityPeak, DensityResult
+from .on_times import gained
 from .result import AXES, TorqueResult, spread
-from .subject import slews, subject_of
+from .subject import slews, subject_of, thrusters_firing
 from .torque import disturbance_torque
+from .torque_on_times import torque_on_times
 
 #: What 004 judges its torque to be off by, and what else is (section VI): their root sum of squares is 7.73 %.
 PRINTED_SHAPE, PRINTED_SCALE = 0.05, 0.059
@@ -67,7 +70,7 @@ def density(
             "the gravity gradient needs the direction of flight and the vertical, and only one is given",
             remedy="Give both (--velocity and --up), or none: then it is bounded.",
         )
-    printed = variant == "printed"
+    printed, steps = variant == "printed", None
     air, about = _drag(craft, where, axis, area_m2, arm_m, printed)
     closest_ns = telemetry.moment(closest_approach)
     first, last = (float(telemetry.seconds(t)) for t in telemetry.span())
@@ -80,6 +83,8 @@ def density(
         )
     if printed and method is None:
         torque = disturbance_torque(telemetry, craft, method="transfer", model="hankel", variant=variant, axis=about)
+    elif not printed and (method == "on-times" or (method is None and thrusters_firing(telemetry))):
+        torque, steps = torque_on_times(telemetry, craft, about)
     else:
         torque = disturbance_torque(telemetry, craft, method=method, variant=variant, axis=about)
     subject = subject_of(telemetry, craft)
@@ -99,10 +104,15 @@ def density(
             file=telemetry.source or None,
             remedy="Take a longer record, or check --closest-approach.",
         )
-    doubts = [*torque.doubts, *_date_doubts(telemetry, where), *_drag_doubts(air, where, area_m2, arm_m, printed)]
+    doubts = [
+        *torque.doubts,
+        *where.doubts,
+        *_date_doubts(telemetry, where),
+        *_drag_doubts(air, where, area_m2, arm_m, printed),
+    ]
     T, gravity = torque.torque_Nm[:, j], None
     I_B = subject.known_inertia()
-    bound = np.full(len(T), _small_torques(where))
+    bound = np.full(len(T), where.moon.small_torques_Nm)
     if velocity_B is not None and not printed:
         gravity = gravity_gradient(I_B, where.position(time_s, up_B, velocity_B), where.moon.mu_m3_s2)[:, j]
         if slews(telemetry):
@@ -118,12 +128,18 @@ def density(
     )
     scale, of_scale = (PRINTED_SCALE, []) if printed else _scale(air)
     doubts += of_scale
-    rho = of_gas / per_density
+    swept = (where.speed(time_s) / where.speed_m_s) ** 2  # the torque per density is that of closest approach
+    rho = of_gas / (per_density * swept)
     if printed:
         sigma = PRINTED_SHAPE * np.abs(rho)
     else:
-        sigma = None if torque.sigma_Nm is None else torque.sigma_Nm[:, j] / abs(per_density)
-    peak = _peak(torque, j, time_s, rho, sigma, scale, where, per_density, gravity, known)
+        sigma = None if torque.sigma_Nm is None else torque.sigma_Nm[:, j] / (abs(per_density) * swept)
+    atmosphere = None
+    if where.moon.atmosphere is not None:
+        steps = steps or gained(telemetry, craft, about)
+        taken_off = None if gravity is None else (time_s, gravity)
+        atmosphere = fit_atmosphere(steps, where, middle, per_density, taken_off)
+    peak = _peak(torque, j, time_s, rho, sigma, scale, where, per_density * swept, gravity, known)
     doubts += _peak_doubts(peak, time_s, bound, known, gravity is not None, printed)
     return DensityResult(
         craft=craft.name,
@@ -137,13 +153,14 @@ def density(
         density_kgm3=rho[near],
         sigma_shape_kgm3=None if sigma is None else sigma[near],
         scale=scale,
-        bound_kgm3=bound[near] / abs(per_density),
+        bound_kgm3=(bound / (abs(per_density) * swept))[near],
         torque_Nm=T[near],
         gravity_gradient_Nm=None if gravity is None else gravity[near],
         torque_per_density=per_density,
         peak=peak,
         noticed_s=None if sigma is None or printed else _noticed(time_s[near], rho[near], sigma[near], peak.time_s),
         beside=_beside(peak, where),
+        atmosphere=atmosphere,
         doubts=tuple(dict.fromkeys(doubts)),
         settings={
             "speed_m_s": where.speed_m_s, "altitude_closest_m": where.altitude_m,
@@ -190,13 +207,6 @@ def _scale(air: Aerodynamics) -> tuple[float, list[str]]:
     return air.drag_coefficient_sigma / air.drag_coefficient, [doubt]
 
 
-def _small_torques(flyby: Flyby) -> float:
-    """Bound of sunlight, generators and magnetism together. [N m]   004 section V"""
-    row, moon = tables()["small_torques"], flyby.moon
-    magnetic = magnetic_torque_bound(quantity(row["dipole"], "A m2"), moon.field_T, moon.field_change)
-    return quantity(row["sunlight"], "N m") + quantity(row["power_generators"], "N m") + magnetic
-
-
 def _peak(torque: TorqueResult, j, time_s, rho, sigma, scale, flyby, per_density, gravity, known) -> DensityPeak:
     k = int(np.flatnonzero(known)[np.argmax(rho[known])])
     at, height = float(time_s[k]), float(rho[k])
@@ -206,7 +216,7 @@ def _peak(torque: TorqueResult, j, time_s, rho, sigma, scale, flyby, per_density
         t = torque.paths_time_s - (torque.time_s[0] - time_s[0])
         off = 0.0 if gravity is None else np.interp(t, time_s, gravity)
         inside = (np.abs(t) <= REACH_S) & (flyby.altitude(t) <= FARTHEST_M)
-        drawn = ((torque.paths_Nm[:, :, j] - off) / per_density)[:, inside]
+        drawn = ((torque.paths_Nm[:, :, j] - off) / np.interp(t, time_s, per_density))[:, inside]
         late = spread(t[inside][np.argmax(np.nan_to_num(drawn, nan=-np.inf), axis=1)])
         when = float(np.hypot(late, _blunt(time_s, rho, known, k, shape)))
     return DensityPeak(
@@ -262,7 +272,8 @@ def _drag_doubts(air: Aerodynamics, flyby: Flyby, area_m2, arm_m, printed: bool)
         doubts.append(
             f"projected area and moment arm are those of the attitude at {air.flyby}, not at {flyby.name}: the density's scale is not known (--area, --arm)"
         )
-    doubts.append("speed, area and arm count as constant through the flyby")
+    constant = "area and arm count" if isinstance(flyby, Trajectory) else "speed, area and arm count"
+    doubts.append(f"{constant} as constant through the flyby")
     if printed:
         doubts.append("printed method: sigma is 004's judgement of 5 % (shape) and 5.9 % (scale), not this record's")
     return doubts

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..dynamics.flyby import Flyby, PublishedPeak
+from .atmosphere import AtmosphereFit
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,7 @@ class DensityResult:
     peak: DensityPeak
     noticed_s: tuple[float, float] | None = None  # first and last instant around the peak above three sigma
     beside: tuple[Beside, ...] = ()
+    atmosphere: AtmosphereFit | None = None  # of a body that has one
     doubts: tuple[str, ...] = ()
     settings: dict = field(default_factory=dict)
 
@@ -107,6 +109,7 @@ class DensityResult:
             "peak": self.peak.record(),
             "noticed_s": self.noticed_s,
             "published": [b.record() for b in self.beside],
+            "atmosphere": None if self.atmosphere is None else self.atmosphere.record(),
             "settings": self.settings,
             "doubts": list(self.doubts),
         }
@@ -127,6 +130,8 @@ class DensityResult:
         lines.append(
             f"  left out  at most {at_peak:.2g} kg/m3 at the peak, {self.bound_kgm3.max():.2g} at most (gravity gradient {modelled})"
         )
+        if self.atmosphere is not None:
+            lines.append(f"  exponential  {self.atmosphere}")
         for b in self.beside:
             q = b.published
             low, high = (f"{1e12 * v:g}" for v in q.density_kgm3)

@@ -84,8 +84,10 @@ class Firings:
         return self.counters.pulses[-1]
 
 
-def firings_of(telemetry: Telemetry, craft: Craft) -> Firings:
-    """Raises BadInput where no thruster fires, one is not the craft's or has no counter, or the momentum is not known."""
+def firings_of(telemetry: Telemetry, craft: Craft, enough_s: float = _ENOUGH_S) -> Firings:
+    """``enough_s``: while something fires, one sample in so long is taken.
+
+    Raises BadInput where no thruster fires, one is not the craft's or has no counter, or the momentum is not known."""
     subject = subject_of(telemetry, craft)
     if subject.relative:
         raise BadInput(
@@ -95,7 +97,7 @@ def firings_of(telemetry: Telemetry, craft: Craft) -> Firings:
     subject.known_inertia()
     thrusters, counters, doubts = counters_of(subject)
     samples = samples_of(subject)
-    chosen = _instants(samples, counters)
+    chosen = _instants(samples, counters, enough_s)
     if len(chosen) < 3:
         raise BadInput(
             f"{len(chosen)} instants at which momentum and on-times are both known are too few",
@@ -124,7 +126,7 @@ def firings_of(telemetry: Telemetry, craft: Craft) -> Firings:
     )
 
 
-def _instants(s: Samples, counters: Counters) -> np.ndarray:
+def _instants(s: Samples, counters: Counters, enough_s: float) -> np.ndarray:
     """Which samples to use: all where nothing fires, in every other interval of the counters the one best known."""
     inside = np.flatnonzero((s.tai_ns >= counters.tai_ns[0]) & (s.tai_ns <= counters.tai_ns[-1]))
     if not len(inside):
@@ -135,7 +137,7 @@ def _instants(s: Samples, counters: Counters) -> np.ndarray:
     # every sample belongs to the counters' sample nearest to it, or to a span of several
     at = (counters.tai_ns - counters.tai_ns[0]) / NS
     nearest = np.searchsorted(0.5 * (at[1:] + at[:-1]), (tai_ns - counters.tai_ns[0]) / NS)
-    nearest = np.floor(at / _ENOUGH_S)[nearest]
+    nearest = np.floor(at / enough_s)[nearest]
     order = np.lexsort((unsure, nearest))
     best = order[np.unique(nearest[order], return_index=True)[1]]
     keep = unsure == 0

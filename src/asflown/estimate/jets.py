@@ -38,7 +38,7 @@ from .external_samples import samples_of
 from .jets_result import JetsResult, Score, Source
 from .jets_surface import WIDTHS_RAD, Surface
 from .result import AXES
-from .subject import slews, subject_of
+from .subject import slews, subject_of, thrusters_firing
 
 WIDTHS = ("own", "common")
 _STEP_S = 0.25  # of the integral: a jet's cusp is seen
@@ -61,6 +61,11 @@ def jets(
         raise BadInput(f"a power of {power:g} is no jet's", remedy="004's is 1, or 2 as in its eq 24.")
     if slews(telemetry):
         raise BadInput("the craft slews in this record", remedy="Narrow the span to the flyby with --start and --stop.")
+    if thrusters_firing(telemetry):
+        raise BadInput(
+            "thrusters fire in this record, and jets are fitted to the momentum of wheels",
+            remedy="Use asflown density, which balances on-times.",
+        )
     met = density(telemetry, craft, flyby, closest_approach, **drag)
     where = met.flyby
     every = [as_passed(j, where) for j in published_jets()]

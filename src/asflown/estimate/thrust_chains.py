@@ -156,6 +156,7 @@ class Covariance:
 
     factor: np.ndarray
     log_determinant: float
+    variance: np.ndarray  # (K d,)
 
     @classmethod
     def of(cls, main, off) -> Covariance:
@@ -168,7 +169,7 @@ class Covariance:
                     full[r - c, c::d] = main[:, r, c]
                 full[d + r - c, c : (K - 1) * d : d] = off[:, r, c]
         factor = cholesky_banded(full, lower=True)
-        return cls(factor, 2 * float(np.sum(np.log(factor[0]))))
+        return cls(factor, 2 * float(np.sum(np.log(factor[0]))), full[0].copy())
 
     def solve(self, columns) -> np.ndarray:
         """C^-1 times columns (K d, m)."""

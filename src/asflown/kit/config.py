@@ -48,3 +48,27 @@ def _in_words(why: ValidationError) -> str:
         said.append(f"{where}: {kind}" if where else kind)
     more = len(why.errors()) - 5
     return "; ".join(said) + (f"; and {more} more" if more > 0 else "")
+
+
+def changes_of(settings, option: str) -> dict:
+    """('a.b=2', 'c=10 s') -> {'a': {'b': 2}, 'c': '10 s'}: values as in TOML, and what is none of its values is text.
+
+    Raises BadInput for what is no key and value, and for a key set twice."""
+    changes: dict = {}
+    for text in settings:
+        key, equals, value = text.partition("=")
+        *tables, last = key.strip().split(".")
+        if not equals or not all([*tables, last]):
+            raise BadInput(
+                f"{option} {text!r} is not a key and a value", remedy="Write it as in duration=60 s, or table.key=2."
+            )
+        at = changes
+        for name in tables:
+            at = at.setdefault(name, {})
+        if not isinstance(at, dict) or last in at:
+            raise BadInput(f"{option} sets {key.strip()!r} twice", remedy="Give each key once.")
+        try:
+            at[last] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            at[last] = value.strip()
+    return changes

@@ -11,7 +11,8 @@ from ..estimate.density_result import DensityResult
 from ..estimate.jets_result import JetsResult
 from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, new_figure, save
 
-_SHOWN_S = (-60.0, 180.0)  # where a plume is met
+_PLUME_S = (-60.0, 180.0)  # where jets are met
+_HEIGHTS = 6  # scale heights of an atmosphere that are shown
 _SCALE = 1e12
 
 
@@ -69,7 +70,8 @@ def save_density_figure(result: DensityResult, path) -> None:
     draw_density(result, ax)
     draw_bound(result, ax)
     draw_published_peaks(result, ax)
-    _finish(figure, ax, result, f"Density met by {result.craft}, {result.flyby.name}", result.doubts, path)
+    finish(figure, ax, result, f"Density met by {result.craft}, {result.flyby.name}", result.doubts)
+    save(figure, path)
 
 
 def save_jets_figure(result: JetsResult, path) -> None:
@@ -78,11 +80,24 @@ def save_jets_figure(result: JetsResult, path) -> None:
     draw_density(result.density, ax)
     draw_jets(result, ax)
     d = result.density
-    _finish(figure, ax, d, f"Jets met by {d.craft}, {d.flyby.name}: power {result.power:g}", result.doubts, path)
+    finish(figure, ax, d, f"Jets met by {d.craft}, {d.flyby.name}: power {result.power:g}", result.doubts)
+    save(figure, path)
 
 
-def _finish(figure, ax, result: DensityResult, title: str, doubts, path) -> None:
-    low, high = max(_SHOWN_S[0], result.time_s[0]), min(_SHOWN_S[1], result.time_s[-1])
+def shown_s(result: DensityResult) -> tuple[float, float]:
+    """The part of a result in which gas is met."""
+    low, high = _PLUME_S
+    flyby = result.flyby
+    if flyby.moon.atmosphere is not None:
+        top = flyby.closest_m + _HEIGHTS * flyby.moon.atmosphere.scale_height_m
+        high = float(np.sqrt(top**2 - flyby.closest_m**2)) / flyby.speed_m_s
+        low = -high
+    return max(low, float(result.time_s[0])), min(high, float(result.time_s[-1]))
+
+
+def finish(figure, ax, result: DensityResult, title: str, doubts) -> None:
+    """Span shown, altitude along the top, legend, title, doubts beneath."""
+    low, high = shown_s(result)
     if high > low:
         ax.set_xlim(low, high)
         ticks = [v for v in ax.get_xticks() if low <= v <= high]
@@ -95,4 +110,3 @@ def _finish(figure, ax, result: DensityResult, title: str, doubts, path) -> None
     if doubts:
         text = "\n".join(textwrap.fill("DOUBT " + d, 125) for d in doubts[:4])
         figure.supxlabel(text, fontsize=6.5, color=RED, x=0.02, ha="left")
-    save(figure, path)

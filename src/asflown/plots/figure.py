@@ -47,6 +47,15 @@ def save(figure, path: str | Path) -> None:
         write_whole(path, lambda p: figure.savefig(p, format=kind, dpi=150, metadata=date_key))
 
 
+def save_figures(figures: dict, folder: Path) -> list[Path]:
+    """As SVG files into ``folder``."""
+    paths = []
+    for name, figure in figures.items():
+        paths.append(Path(folder) / f"{name}.svg")
+        save(figure, paths[-1])
+    return paths
+
+
 def save_svg(figure, stream, salt: str) -> None:
     """SVG into a text stream; ``salt`` makes its ids differ from other figures' in the same page."""
     with _look(salt):

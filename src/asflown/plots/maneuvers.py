@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
 from ..estimate.gates_judge import Judgement
@@ -11,7 +9,7 @@ from ..estimate.gates_result import GatesFit
 from ..estimate.gates_tests import Directions
 from ..estimate.gates_watch import Watch
 from ..maneuvers.model import Gates
-from .figure import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save
+from .figure import BLUE, GREEN, GREY, ORANGE, RED, new_figure
 from .labels import label_points
 
 #: Burns up to which all are labelled; of more, those that stand out.
@@ -311,15 +309,6 @@ def gates_figures(fit: GatesFit, judged: Judgement) -> dict:
     if fit.known:
         figures["distribution"] = distribution_figure(fit, judged)
     return figures
-
-
-def save_figures(figures: dict, folder: Path) -> list[Path]:
-    """As SVG files into ``folder``."""
-    paths = []
-    for name, figure in figures.items():
-        paths.append(Path(folder) / f"{name}.svg")
-        save(figure, paths[-1])
-    return paths
 
 
 def _marked(judged: Judgement, component: str) -> tuple[str, ...]:

@@ -9,42 +9,8 @@ import numpy as np
 from ..kit.errors import BadInput
 from ..kit.quantities import si_factor
 from ..telemetry.channels import AXES, split_header
+from .passage import Passed, plume_torque
 from .scenario import Constant, Plume, Scenario, Table, Triangles, axis_number
-
-# 004 section VII: flyby Enceladus-3 and the three jets (Table 2: tilt delta and offset Delta; Table 3: K)
-ENCELADUS_RADIUS_KM, CLOSEST_ALTITUDE_KM, SPEED_KM_S, LATITUDE_RAD = 252.3, 47.9, 14.41, np.radians(20.0)
-JETS = {  # name: delta [rad], Delta [km], K [kg/m3]
-    "Alexandria": (np.radians(17.1), 17.8, 0.55e-12),
-    "Cairo": (np.radians(7.9), 11.8, 10.3e-12),
-    "Damascus": (np.radians(-10.6), 0.40, 8.5e-12),
-}
-JET_WIDTH_RAD = 0.36
-#: Torque about z over density, (1/2) C_D V^2 A l = 0.5 x 2.1 x 14410^2 x 18.401 x 0.853 (004 eq 22). [N m / (kg/m3)]
-TORQUE_PER_DENSITY = 3.4222e9
-#: Jet distances within which 004 eq 26 is meant to hold. [km]
-NEAREST_KM, FARTHEST_KM = 50.0, 1400.0
-
-
-def plume_density(since_closest_s, exponent: int = 1) -> np.ndarray:
-    """Density along the Enceladus-3 flyby, the sum of three jets. [kg/m3]   004 eqs 23, 26, 27
-
-        rho = sum K (R_E / r)^(3/2) exp(-(theta / K_theta)^exponent)
-
-    theta uses atan2 where the paper prints atan, which fails before the craft has passed the jet's
-    pole; a jet counts only between 50 and 1400 km, where the paper applies the model, and fades to
-    nothing over the last tenth of that reach: cut off outright it would leave a step in the torque."""
-    t = np.asarray(since_closest_s, float)
-    total = np.zeros_like(t)
-    radius = ENCELADUS_RADIUS_KM + CLOSEST_ALTITUDE_KM
-    for tilt, offset, strength in JETS.values():
-        p = radius * np.cos(LATITUDE_RAD) - SPEED_KM_S * t * np.sin(LATITUDE_RAD) - ENCELADUS_RADIUS_KM * np.sin(tilt)
-        q = radius * np.sin(LATITUDE_RAD) + SPEED_KM_S * t * np.cos(LATITUDE_RAD) - ENCELADUS_RADIUS_KM * np.cos(tilt)
-        r = np.sqrt(p**2 + q**2 + offset**2)
-        theta = np.abs(np.arctan2(p, q) - tilt)
-        fade = np.clip((FARTHEST_KM - r) / (0.1 * FARTHEST_KM), 0, 1)
-        density = strength * (ENCELADUS_RADIUS_KM / r) ** 1.5 * np.exp(-((theta / JET_WIDTH_RAD) ** exponent))
-        total += np.where(r >= NEAREST_KM, density * fade, 0.0)
-    return total
 
 
 def triangle_corners(source: Triangles) -> tuple[np.ndarray, np.ndarray]:
@@ -55,11 +21,14 @@ def triangle_corners(source: Triangles) -> tuple[np.ndarray, np.ndarray]:
     return times, torques
 
 
-def profile_peaks(scenario: Scenario) -> list[tuple[float, float, str]]:
+def profile_peaks(scenario: Scenario, met: Passed | None) -> list[tuple[float, float, str]]:
     """(time [s], torque [N m], axis) of every injected peak, in order of time.
 
-    A peak is a corner of a triangle, a turning point of an inline table, the largest plume torque."""
+    A peak is a corner of a triangle, a turning point of an inline table, the largest torque of a gas."""
     peaks = []
+    if met is not None:
+        at, _, _, torque = met.peak
+        peaks.append((at, torque, AXES[met.axis]))
     for source in scenario.torques:
         if isinstance(source, Triangles):
             times, torques = triangle_corners(source)
@@ -69,15 +38,17 @@ def profile_peaks(scenario: Scenario) -> list[tuple[float, float, str]]:
             turns = np.flatnonzero(np.diff(np.sign(np.diff(T))) * np.sign(T[1:-1]) < 0) + 1
             peaks += [(float(t[i]), float(T[i]), source.axis) for i in turns]
         elif isinstance(source, Plume):
-            times, torques = _plume_table(source, scenario.duration)
+            times, torques = plume_torque(source, scenario.duration)
             i = int(np.argmax(np.abs(torques)))
             peaks.append((float(times[i]), float(torques[i]), source.axis))
     return sorted(peaks)
 
 
-def torque_table(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
+def torque_table(scenario: Scenario, met: Passed | None) -> tuple[np.ndarray, np.ndarray]:
     """All sources together: times (k,) [s] and torques (k, 3) [N m], to be joined by straight lines."""
     pieces = [_corners(source, scenario) for source in scenario.torques]
+    if met is not None:
+        pieces.append((met.time_s, met.torque_Nm))
     if not pieces:
         return np.empty(0), np.empty((0, 3))
     times = np.unique(np.concatenate([t for t, _ in pieces]))
@@ -98,7 +69,7 @@ def _corners(source, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     elif isinstance(source, Table):
         times, torques = np.array(source.times), np.array(source.torques)
     else:
-        times, torques = _plume_table(source, scenario.duration)
+        times, torques = plume_torque(source, scenario.duration)
     along = np.zeros((len(times), 3))
     along[:, axis_number(source.axis)] = torques
     return _ended(times, along)
@@ -111,12 +82,6 @@ def _ended(times, torques) -> tuple[np.ndarray, np.ndarray]:
     if np.any(torques[-1]):
         times, torques = np.r_[times, times[-1] + 1e-6], np.vstack([torques, np.zeros(3)])
     return times, torques
-
-
-def _plume_table(source: Plume, duration: float) -> tuple[np.ndarray, np.ndarray]:
-    times = np.arange(0.0, duration + 0.03125, 0.03125)  # one Runge-Kutta step: the curve, not its chords
-    density = plume_density(times - source.closest_approach, source.exponent)
-    return times, source.sign * TORQUE_PER_DENSITY * density
 
 
 def _read_table(path) -> tuple[np.ndarray, np.ndarray]:

@@ -18,6 +18,7 @@ from .cover import MovingPart, motor_telemetry, moving_part
 from .disturbances import profile_peaks, torque_table
 from .faults import coasting, drag_table
 from .modes import swinging
+from .passage import Passed, passed
 from .plant import Errors, Loop, Plant, fly_cycles, moving_part_history
 from .sampling import axes_of, telemetry_of
 from .scenario import Scenario, load_scenario
@@ -56,6 +57,8 @@ class Truth:
     mode_amplitude: np.ndarray  # (N, modes), hybrid coordinates [kg(1/2) m]
     mode_rate: np.ndarray  # (N, modes)
     ledger_J: np.ndarray  # (N, 4): work by the external torque, by the motors, lost in bearings, in modes
+    density_kgm3: np.ndarray | None  # (N,), of the gas met in a flyby
+    altitude_m: np.ndarray | None  # (N,)
     thrusters: ThrusterTruth | None
     cover_angle_rad: np.ndarray | None  # (N,)
     peaks: tuple[tuple[float, float, str], ...]  # (time [s], torque [N m], axis) of the injected profile
@@ -74,6 +77,7 @@ class Flight:
     seed: int
     ended: str
     doubts: tuple[str, ...] = ()
+    met: Passed | None = None
 
 
 def fly(scenario, *, craft=None, seed: int | None = None, noise: str | None = None, progress=None, **changes) -> Flight:
@@ -99,7 +103,10 @@ def fly(scenario, *, craft=None, seed: int | None = None, noise: str | None = No
     _check_flyable(scenario, now)
     loop = wheel_loop(scenario, now)
     part = moving_part(scenario.cover, now) if scenario.cover else None
-    plant = _plant(scenario, now, part)
+    met = None
+    if scenario.flyby is not None:
+        met = passed(scenario.flyby, now, -scenario.settle, scenario.duration)
+    plant = _plant(scenario, now, part, met)
     if (scenario.settle + scenario.duration) / loop.period > MOST_CYCLES:
         raise BadInput(
             f"{scenario.settle + scenario.duration:g} s are more than {MOST_CYCLES:,} control cycles of {loop.period:g} s",
@@ -135,12 +142,12 @@ def fly(scenario, *, craft=None, seed: int | None = None, noise: str | None = No
 
     columns = _Columns(len(now.wheels), plant, len(thrusters.delay))
     fired = thruster_truth(rows, columns, thrusters, now.craft, loop.period, before) if scenario.thrusters else None
-    truth = _truth(rows, times, columns, plant, now, scenario, part, fired)
+    truth = _truth(rows, times, columns, plant, now, scenario, part, fired, met)
     command = (w_c[before:flown], q_c[before:flown])
     readings = _readings(rows, columns, truth, command, now, scenario, part)
     telemetry = telemetry_of(readings, scenario, loop.period, scenario.seed, scenario.name)
     doubts = now.doubts + thrust_doubts(scenario, craft)
-    return Flight(telemetry, truth, scenario, craft, now.inertia_kgm2, names, scenario.seed, ended, doubts)
+    return Flight(telemetry, truth, scenario, craft, now.inertia_kgm2, names, scenario.seed, ended, doubts, met)
 
 
 def _check_flyable(scenario: Scenario, now: CraftAt) -> None:
@@ -161,10 +168,10 @@ def _check_flyable(scenario: Scenario, now: CraftAt) -> None:
             )
 
 
-def _plant(scenario: Scenario, now: CraftAt, part: MovingPart | None) -> Plant:
+def _plant(scenario: Scenario, now: CraftAt, part: MovingPart | None, met: Passed | None = None) -> Plant:
     coupling, natural, damping = swinging(scenario, now)
     drag = [(w.drag.viscous, w.drag.coulomb, w.drag.stiction) if scenario.friction else (0.0,) * 3 for w in now.wheels]
-    times, torques = torque_table(scenario)
+    times, torques = torque_table(scenario, met)
     spike_times, spikes = drag_table(scenario, tuple(w.name for w in now.wheels))
     zero = np.zeros(3)
     return Plant(
@@ -227,7 +234,7 @@ class _Columns:
             at += width
 
 
-def _truth(rows, times, columns, plant: Plant, now: CraftAt, scenario: Scenario, part, fired) -> Truth:
+def _truth(rows, times, columns, plant: Plant, now: CraftAt, scenario: Scenario, part, fired, met) -> Truth:
     rate, wheel_rate = rows[:, columns.rate], rows[:, columns.wheel_rate]
     stored = wheel_rate * plant.spin_inertia @ plant.wheel_axes
     torque = np.zeros_like(rate)
@@ -257,9 +264,11 @@ def _truth(rows, times, columns, plant: Plant, now: CraftAt, scenario: Scenario,
         mode_amplitude=rows[:, columns.mode],
         mode_rate=rows[:, columns.mode_rate],
         ledger_J=rows[:, columns.ledger] - rows[0, columns.ledger],
+        density_kgm3=None if met is None else np.interp(times, met.time_s, met.density_kgm3),
+        altitude_m=None if met is None else np.interp(times, met.time_s, met.altitude_m),
         thrusters=fired,
         cover_angle_rad=None if part is None else part.stowed + angle,
-        peaks=tuple(profile_peaks(scenario)),
+        peaks=tuple(profile_peaks(scenario, met)),
     )
 
 

@@ -18,6 +18,7 @@ from ..craft.model import (
     InertiaElements,
     Kilogram,
     Metre,
+    Metre2,
     MetrePerSecond,
     MetreVector,
     Newton,
@@ -103,7 +104,7 @@ class Table(Part):
 
 
 class Plume(Part):
-    """Drag torque of a plume of gas on a straight flyby (004 eqs 21-27, its Tables 2 and 3)."""
+    """Drag torque of E3's plume about one axis, with 004's own area and arm; a ``Passage`` has more."""
 
     shape: Literal["plume"]
     flyby: Literal["enceladus-3"] = "enceladus-3"
@@ -111,6 +112,38 @@ class Plume(Part):
     axis: Literal["x", "y", "z"] = "z"
     sign: Literal[-1, 1] = -1
     exponent: Literal[1, 2] = 1
+
+
+class Passage(Part):
+    """A straight flyby through gas: of jets, or where the body has one of an atmosphere (004 eqs 19-27).
+
+    Constants are those of ``dynamics.flyby`` unless given; the craft holds its attitude, in which ``arm`` is u x (r_CP - r_CM)."""
+
+    name: str  # E3, E4, E5, E9, Titan
+    closest_approach: Second
+    altitude: Metre | None = Field(default=None, gt=0)  # at closest approach
+    speed: MetrePerSecond | None = Field(default=None, gt=0)
+    latitude_south: Radian | None = None
+    longitude_west: Radian | None = None
+    jets: dict[str, float] | None = None  # those that blow and how strongly; all of Table 3, each once
+    exponent: Literal[1, 2] = 1
+    angle: Literal["plane", "space"] = "plane"
+    density: _in("kg/m3") | None = Field(default=None, gt=0)  # type: ignore[valid-type]  # of the atmosphere, at its own altitude
+    scale_height: Metre | None = Field(default=None, gt=0)
+    area: Metre2 | None = Field(default=None, gt=0)  # the craft's
+    arm: MetreVector | None = None  # the craft's, about its axis, negative as E3's
+    gravity_gradient: bool = False
+    velocity: Direction | None = None  # of flight, and from the body to the craft at closest approach; body axes
+    up: Direction | None = None
+    small_torques: bool = False  # sunlight, generators and magnetism at their bounds, about the arm
+
+    @model_validator(mode="after")
+    def _sensible(self):
+        if self.gravity_gradient and (self.velocity is None or self.up is None):
+            raise ValueError("gravity_gradient needs velocity and up, in body axes")
+        if self.jets is not None and (not self.jets or min(self.jets.values()) < 0):
+            raise ValueError("jets: one or more, each with a factor that is not negative")
+        return self
 
 
 AnyTorque = Annotated[Triangles | Constant | Table | Plume, Field(discriminator="shape")]
@@ -350,6 +383,7 @@ class Scenario(Plan):
     accelerometer_bias: _in("m/s2") = 0.0  # type: ignore[valid-type]
     wheel_rates: _by_name("rad/s") = Field(default_factory=dict)  # type: ignore[valid-type]
     torques: tuple[AnyTorque, ...] = ()
+    flyby: Passage | None = None
     slews: tuple[Slew, ...] = ()
     coasts: tuple[Coast, ...] = ()
     drag_spikes: tuple[DragSpike, ...] = ()
@@ -374,6 +408,8 @@ class Scenario(Plan):
     def _with_thrusters(self):
         if self.thrusters is None and (self.thruster_faults or self.telemetry.accelerometer_count):
             raise ValueError("thruster_faults and accelerometer_count are of a flight with [thrusters]")
+        if self.flyby and self.flyby.gravity_gradient and self.slews:
+            raise ValueError("a flyby with gravity_gradient is flown at one attitude: no slews")
         if (self.wheel_biases or self.burns) and not (self.thrusters and self.thrusters.control):
             raise ValueError("wheel_biases and burns need [thrusters] that hold the attitude")
         if any(b.start < a.start for a, b in pairwise(self.burns)):

@@ -49,6 +49,8 @@ def truth_table(flight) -> str:
         add("thrust", "N", truth.thrusters.thrust_N, truth.thrusters.names)
         add("impulse", "N s", truth.thrusters.impulse_Ns, truth.thrusters.names)
         add("linear_impulse_inertial", "N s", truth.thrusters.linear_impulse_Ns(truth.attitude), AXES)
+    if truth.density_kgm3 is not None:
+        columns |= {"density [kg/m3]": truth.density_kgm3, "altitude [m]": truth.altitude_m}
     if truth.cover_angle_rad is not None:
         columns["cover_angle [rad]"] = truth.cover_angle_rad
     head = [
@@ -80,6 +82,7 @@ def truth_record(flight) -> dict:
         "drag_spikes": [d.model_dump() for d in scenario.drag_spikes],
         "wheel_drag": _drag_of(flight),
         "thrusters": None if truth.thrusters is None else _thrusters_of(flight),
+        "flyby": None if flight.met is None else flight.met.record(),
         "peaks": [{"time_s": t, "torque_Nm": T, "axis": a} for t, T, a in truth.peaks],
         "assumptions": list(scenario.assumptions),
         "doubts": list(flight.doubts),

@@ -166,13 +166,13 @@ def _self_described(tables: list[Table]) -> Read:
     """Channels from headings 'name [unit]' under a first column 'time [..]'."""
     parts: list[Table] = []
     for table in tables:
-        _time_scale(table)
+        time_scale(table)
         where = long_columns(table.headings)
         parts += divided(table, 0, *where) if where else [table]
-    return assembled([(part, 0, _time_scale(part), *_headed(part)) for part in parts], None)
+    return assembled([(part, 0, time_scale(part), *_headed(part)) for part in parts], None)
 
 
-def _time_scale(table: Table) -> str:
+def time_scale(table: Table) -> str:
     first = split_header(table.headings[0])
     if first is None or first[0].lower() != "time":
         raise BadInput(
@@ -221,15 +221,15 @@ def assembled(parts: Sequence[tuple[Table, int, str, list[Use], list[int]]], epo
     """Channels of all tables on one TAI axis.  A part is (table, time column, scale, uses, further clocks).
 
     ``epoch`` (UTC) is the zero of scale 's', or else what the tables say of themselves (the earliest)."""
-    said = [ns for table, *_ in parts if (ns := _origin(table.epoch)) is not None]
-    origin = _origin(epoch) if epoch is not None else min(said, default=None)
+    said = [ns for table, *_ in parts if (ns := origin_of(table.epoch)) is not None]
+    origin = origin_of(epoch) if epoch is not None else min(said, default=None)
     dated = origin is not None or any(scale != "s" for _, _, scale, _, _ in parts)
     channels: dict[str, Channel] = {}
     labels: dict[str, np.ndarray] = {}
     label_ns, times = np.empty(0, np.int64), []
     findings: list[Finding] = []
     for table, time, scale, uses, clocks in parts:
-        zero = _origin(table.epoch) if epoch is None and table.epoch is not None else origin
+        zero = origin_of(table.epoch) if epoch is None and table.epoch is not None else origin
         tai_ns = times_of(table, time, scale, zero or 0)
         times.append(tai_ns)
         for use in uses:
@@ -252,7 +252,7 @@ def assembled(parts: Sequence[tuple[Table, int, str, list[Use], list[int]]], epo
     return Read(channels, epoch_ns, dated, labels, label_ns, findings, times)
 
 
-def _origin(epoch: str | None) -> int | None:
+def origin_of(epoch: str | None) -> int | None:
     if epoch is None:
         return None
     year = epoch.strip()[:4]

@@ -1,0 +1,90 @@
+"""A trajectory from a table: position and velocity of a craft from a body's centre, in axes fixed to the body.
+
+    # epoch: 2008-03-12T19:06:12
+    time [s],position_x [km],position_y [km],position_z [km],velocity_x [km/s],velocity_y [km/s],velocity_z [km/s]
+
+z along the body's spin axis to its north pole, x through its prime meridian.  Time may be UTC or ET too, as in telemetry.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..kit.errors import BadInput
+from ..kit.files import sha256_of
+from ..kit.quantities import si_factor
+from .channels import AXES, split_header
+from .load import origin_of, time_scale
+from .tables import Table, numbers_of, read_csv, times_of
+
+_FEWEST = 4
+_UNITS = {"position": "m", "velocity": "m/s"}
+#: A velocity may differ from the positions' own by this share before it is taken for one of another frame or unit.
+_UNLIKE = 0.05
+
+
+@dataclass(frozen=True)
+class TrajectoryTable:
+    """At instants (N,) int64 ns TAI, or ns from closest approach where ``dated`` is false: (N, 3) [m], (N, 3) [m/s]."""
+
+    tai_ns: np.ndarray
+    dated: bool
+    position_m: np.ndarray
+    velocity_m_s: np.ndarray
+    sha256: str
+
+
+def load_trajectory(path: str | Path) -> TrajectoryTable:
+    """Raises BadInput, naming file, line or column, for what is no such table or contradicts itself."""
+    try:
+        return _read(Path(path))
+    except BadInput as why:
+        raise why.within(path) from None
+
+
+def _read(path: Path) -> TrajectoryTable:
+    try:
+        data = path.read_bytes()
+    except OSError as why:
+        raise BadInput(f"the trajectory cannot be read ({why.strerror})", remedy="Check the path.") from None
+    table = read_csv(data)
+    scale = time_scale(table)
+    origin = origin_of(table.epoch)
+    tai_ns = times_of(table, 0, scale, origin or 0)
+    columns = {
+        stem: np.stack([_column(table, f"{stem}_{a}", unit) for a in AXES], axis=1) for stem, unit in _UNITS.items()
+    }
+    if len(tai_ns) < _FEWEST:
+        raise BadInput(f"{len(tai_ns)} rows are too few for a trajectory", remedy=f"Give at least {_FEWEST}.")
+    if np.any(np.diff(tai_ns) <= 0):
+        k = int(np.flatnonzero(np.diff(tai_ns) <= 0)[0])
+        raise BadInput(
+            "its times do not increase", line=table.line(k + 1), remedy="Sort the rows by time, each instant once."
+        )
+    r, v = columns["position"], columns["velocity"]
+    chord = np.diff(r, axis=0) / (np.diff(tai_ns) / 1e9)[:, None]
+    off = np.linalg.norm(chord - 0.5 * (v[1:] + v[:-1]), axis=1) / np.maximum(np.linalg.norm(chord, axis=1), 1e-12)
+    if np.median(off) > _UNLIKE:
+        raise BadInput(
+            f"its velocities are not those of its positions (they differ by {100 * np.median(off):.0f} %)",
+            remedy="Give both in axes fixed to the body, with their units, and rows no more than some seconds apart.",
+        )
+    return TrajectoryTable(tai_ns, origin is not None or scale != "s", r, v, sha256_of(data))
+
+
+def _column(table: Table, name: str, unit: str) -> np.ndarray:
+    for j, heading in enumerate(table.headings):
+        split = split_header(heading)
+        if split is not None and split[0] == name:
+            rows, values, nan = numbers_of(table, j, name)
+            if len(rows) < len(table) or len(nan):
+                raise BadInput("a row has no value", channel=name, remedy="Every row gives position and velocity.")
+            return values * si_factor(split[1], unit)
+    raise BadInput(
+        "this column is not in the trajectory",
+        channel=name,
+        remedy="Its header is time [s],position_x [km],position_y [km],position_z [km],velocity_x [km/s],velocity_y [km/s],velocity_z [km/s].",
+    )
