@@ -24,6 +24,10 @@ _KNOWN = 0.25
 _ROUNDING = 1e-6
 
 
+class NothingFires(BadInput):
+    """No on-time rises."""
+
+
 class Known(NamedTuple):
     """What counters tell of N instants, (N, j) each.
 
@@ -132,7 +136,7 @@ def counters_of(subject: Subject) -> tuple[tuple[Thruster, ...], Counters, list[
     on, loose = values[:, : len(names)], loose[:, : len(names)]
     steps, broken = _risen(np.diff(on, axis=0), "on-time", names, tlm, tai_ns, doubts)
     if not (steps > 0).any():
-        raise BadInput(
+        raise NothingFires(
             "no thruster fires in this record",
             file=tlm.source or None,
             remedy="Take a record of a wheel biasing, a run-down under thruster control or a burn.",

@@ -19,12 +19,16 @@ from ..craft.model import Craft
 from ..kit.errors import BadInput, some_of
 from ..kit.timeline import NS, utc_label
 from ..telemetry.telemetry import Telemetry
+from .leak_doubts import branch_doubts, loss_doubt, pointing_doubt
 from .leak_error_monitor import ErrorMonitor, error_monitor, threshold_at_rate
 from .leak_filter import Evidence, Known, Monitor, threshold_for
 from .leak_firing import geometry_of
 from .leak_result import LeakResult
 from .leak_samples import AXES_IN_A_LEAK, Noise, Steps, learned_noise, steps_of
 from .subject import Subject, subject_of
+from .thruster_branch import other_branch
+from .uncounted import PULSES, gained_idle, pulse_Nms, uncounted
+from .wheel_limits import stopped
 
 METHODS = ("likelihood", "threshold")
 
@@ -36,7 +40,6 @@ POWER = 0.9  # of the smallest detectable leak
 _HELD_BACK = 3
 _FAR_FROM_KNOWN = 200 * 86_400 * NS  # a thrust from longer ago is doubted
 _SURE = 0.95  # posterior below which the thruster named is doubted
-_MISFIT = 7.0  # log likelihood ratio of any direction over the best column; noise exceeds it once in 1100
 _FEW_DEGREES = 120
 _FOLLOWING = 3.0  # readings worth one, beyond which a doubt says so
 
@@ -104,6 +107,9 @@ class LeakWatch:
         thrust = self._thrust_N or self._believed_thrust(telemetry.epoch_ns)
         try:
             steps = steps_of(subject, self.geometry, thrust)
+        except BadInput as why:
+            raise why.within(telemetry.source) from why.__cause__
+        try:
             if not final:
                 steps = steps.first(len(steps.tai_ns) - _HELD_BACK)
             if self._monitor is not None and not self._follows(steps):
@@ -111,6 +117,10 @@ class LeakWatch:
             if self._noise is None:
                 self._noise = learned_noise(steps, final)
         except BadInput as why:
+            if final and not steps.ordered.any():
+                gained, pulses = gained_idle(steps.residual, self.craft, self.geometry.shortest_s, telemetry.epoch_ns)
+                if pulses > PULSES:
+                    raise uncounted(gained, pulses, "in this record", telemetry.source) from why
             raise why.within(telemetry.source) from why.__cause__
         self._view = _View(subject, steps, thrust)
         if self._noise is None:
@@ -142,11 +152,13 @@ class LeakWatch:
             doubts.append(
                 f"up to its end or its alarm the record is shorter than {self.window_s:g} s: the smallest leak found by then is not given"
             )
+        if alarm is not None:
+            doubts += [*branch_doubts(tlm, self.craft), *stopped(view.subject)]
         if alarm is not None and self.method == "threshold":
             found |= {"kind": "leak", "thruster": papers.thruster}
             doubts.append("the papers' monitor gives no probability, and takes any momentum not ordered for a leak")
         elif alarm is not None and monitor.best is not None:
-            told, more = self._told(monitor.best, t, view.thrust_N)
+            told, more = self._told(monitor.best, t, view.thrust_N, tlm.epoch_ns)
             found |= told
             doubts += more
         return LeakResult(
@@ -226,7 +238,7 @@ class LeakWatch:
             if age[0] <= w <= age[-1]
         }
 
-    def _told(self, e: Evidence, t, thrust_N: float) -> tuple[dict, list[str]]:
+    def _told(self, e: Evidence, t, thrust_N: float, epoch_ns: int) -> tuple[dict, list[str]]:
         """What the evidence says of the change, and doubts."""
         weights, names = e.weights(thrust_N), self.geometry.names
         j, by_hypothesis = len(names), weights.sum(axis=0)
@@ -246,18 +258,16 @@ class LeakWatch:
             "posterior": dict(zip(names, posterior.tolist(), strict=True)),
             "onset_s": float(since[b]), "onset_95_s": (float(since[low]), float(t[e.onset[min(high, len(since) - 1)]])),
         }  # fmt: skip
-        doubts = []
+        better = 0.5 * float(e.free_d[b] @ free) - 0.5 * float(e.d[b, h] ** 2 / e.c[b, h])
+        gained = float(np.linalg.norm(free)) * (t[e.instant] - since[b])
+        one = pulse_Nms(self.craft, self.craft.thrusters, self.geometry.shortest_s, epoch_ns)
+        doubts = [pointing_doubt(better, free, C, self.geometry, gained / one)]
         if weak:
             found |= {"loss": size, "loss_sigma": sigma}
+            doubts.append(loss_doubt(size, sigma))
         else:
             found |= {"leak_N": size, "leak_sigma_N": sigma, "torque_Nm": free,
                       "torque_sigma_Nm": np.sqrt(np.diag(np.linalg.inv(C)))}  # fmt: skip
-            better = 0.5 * float(e.free_d[b] @ free) - 0.5 * float(e.d[b, h] ** 2 / e.c[b, h])
-            if better > _MISFIT:
-                doubts.append(
-                    f"the torque does not point as any thruster's would (log likelihood ratio {better:.1f}): something else may turn "
-                    "the craft, or centre of mass or inertia are not right"
-                )
             if np.linalg.norm(free) < 5 * self.known.torque_Nm:
                 doubts.append(
                     "a torque so small may come from outside too (sunlight, thin atmosphere) and have changed"
@@ -271,15 +281,11 @@ class LeakWatch:
             doubts.append(
                 "it is there from the record's beginning: only its size tells it from the steady torque from outside"
             )
-        return found, doubts
+        return found, [d for d in doubts if d]
 
     def _alternative(self, thruster: str | None) -> str | None:
         """The thruster of the other branch sits beside this one, and momentum cannot tell them apart."""
-        if thruster is None:
-            return None
-        branch = self.geometry.branches[self.geometry.names.index(thruster)]
-        other = {"A": "B", "B": "A"}.get(branch)
-        return f"{thruster} of branch {other}" if other else None
+        return None if thruster is None else other_branch(thruster, self.craft.thrusters)
 
     def _about(self, view: _View) -> list[str]:
         doubts, noise, tlm = [], self._noise, view.subject.telemetry
