@@ -9,7 +9,7 @@ A ``LeakWatch`` takes telemetry as it grows and gives in pieces what one look at
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,8 +21,9 @@ from ..kit.timeline import NS, utc_label
 from ..telemetry.telemetry import Telemetry
 from .leak_doubts import branch_doubts, loss_doubt, pointing_doubt
 from .leak_error_monitor import ErrorMonitor, error_monitor, threshold_at_rate
-from .leak_filter import Evidence, Known, Monitor, threshold_for
+from .leak_filter import Evidence, Monitor, threshold_for
 from .leak_firing import geometry_of
+from .leak_known import Known
 from .leak_result import LeakResult
 from .leak_samples import AXES_IN_A_LEAK, Noise, Steps, learned_noise, steps_of
 from .subject import Subject, subject_of
@@ -181,11 +182,12 @@ class LeakWatch:
             noise_Nms=self._noise.sigma,
             monitor=papers,
             doubts=tuple(dict.fromkeys(doubts)),
+            taken_as_known=str(self.known),
             settings={
                 "thrust_N": view.thrust_N,
                 "center_of_mass_m": self.craft.center_of_mass,
                 "inertia_kg_m2": view.subject.inertia_kgm2,
-                "one_sigma_of_what_is_known": asdict(self.known),
+                "one_sigma_of_what_is_known": self.known.record(),
             },
         )
 

@@ -50,6 +50,7 @@ class LeakResult:
     monitor: ErrorMonitor
     doubts: tuple[str, ...] = ()
     settings: dict = field(default_factory=dict)
+    taken_as_known: str = ""
 
     def record(self) -> dict:
         """The JSON form, without command and provenance."""
@@ -99,6 +100,7 @@ class LeakResult:
             )
             lines.append(f"    [µN m]  {by_window}")
         lines.append(f"  {self._monitor_text()}")
+        lines.append(f"  taken as known: {self.taken_as_known}")
         return "\n".join(lines)
 
     def _verdict(self) -> list[str]:
