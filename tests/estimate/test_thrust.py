@@ -176,7 +176,7 @@ def test_law_squares_of_lengths_follow_single_pulses(burn):
     f = firings_of(burn.telemetry, CASSINI)
     for k, name in enumerate(NAMES[:4]):
         lengths = np.array([p[1] for p in burn.truth.thrusters.pulses_of(name, burn.truth.time_s)])
-        assert f.counters.squares[-1, k] == pytest.approx(np.sum(lengths**2), rel=0.1)
+        assert f.counters.lengths.squares[-1, k] == pytest.approx(np.sum(lengths**2), rel=0.1)
 
 
 # ---- recovery -----------------------------------------------------------------------------------------------

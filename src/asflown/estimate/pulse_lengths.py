@@ -1,0 +1,59 @@
+"""How long pulses were, from on-times and numbers of pulses: what scatters from pulse to pulse keeps through one of minutes.
+
+Pulses that begin in one interval of the counters are alike in it; the last of them goes on through intervals in which none
+begins.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+#: A pulse that goes on through so many intervals of the counters after its own is followed by itself; of a record, so many.
+_INTERVALS, _MOST = 2, 60
+
+
+@dataclass(frozen=True)
+class Lengths:
+    """At the counters' instants (M,).  ``squares`` (M, j): of all pulses' lengths, added up [s2]; ``short``: of those that are not
+    followed one by one.  ``long`` (M, L): on-time so far of each that is [s], and ``thruster`` (L,) it is of."""
+
+    squares: np.ndarray
+    short: np.ndarray
+    long: np.ndarray
+    thruster: np.ndarray
+
+
+def lengths_of(on_time_s, pulses) -> Lengths:
+    """From counters (M, j), both cumulative."""
+    steps, begun = np.diff(on_time_s, axis=0), np.diff(pulses, axis=0)
+    added, gone_on = np.zeros_like(steps), []
+    for j, (T, n) in enumerate(zip(steps.T, begun.T, strict=True)):
+        starts = np.flatnonzero((T > 0) & ((n >= 0.5) | np.r_[True, T[:-1] <= 0]))
+        for a, b in pairwise([*starts, len(T)]):
+            count = max(n[a], 1.0)
+            own = T[a] / count
+            last = own + T[a + 1 : b].sum()
+            added[a, j] = (count - 1) * own**2 + own * last
+            added[a + 1 : b, j] = T[a + 1 : b] * last
+            if np.count_nonzero(T[a + 1 : b]) >= _INTERVALS:
+                gone_on.append((last, j, a, b, own))
+    short, long, thruster = added.copy(), [], []
+    for last, j, a, b, own in sorted(gone_on, reverse=True)[:_MOST]:
+        course = np.zeros(len(steps))
+        course[a], course[a + 1 : b] = own, steps[a + 1 : b, j]
+        short[a:b, j] -= course[a:b] * last
+        long.append(course)
+        thruster.append(j)
+    return Lengths(
+        _so_far(added),
+        _so_far(np.maximum(short, 0.0)),
+        _so_far(np.array(long).reshape(len(long), len(steps)).T),
+        np.array(thruster, int),
+    )
+
+
+def _so_far(steps) -> np.ndarray:
+    return np.vstack([np.zeros(steps.shape[1]), np.cumsum(steps, axis=0)])
