@@ -302,7 +302,18 @@ def test_verb_takes_and_shows_what_is_known(leak_of_z3, tmp_path):
     """A looser torque from outside hides a leak longer; every sigma said is in the JSON and in the text."""
     file = tmp_path / "t.csv"
     write_table(leak_of_z3.telemetry, file)
-    loose = ["--torque-sigma", "3e-5 N m", "--torque-walk", "1e-2 N m", "--cm-sigma", "0.1 0.1 0.5 m", "--thrust-sigma", "0.2", "--unlike", "0.05"]
+    loose = [
+        "--torque-sigma",
+        "3e-5 N m",
+        "--torque-walk",
+        "1e-2 N m",
+        "--cm-sigma",
+        "0.1 0.1 0.5 m",
+        "--thrust-sigma",
+        "0.2",
+        "--unlike",
+        "0.05",
+    ]
     loose += ["--pulse-scatter", "0.02", "--inertia-sigma", "0.02", "--spin-sigma", "0.005"]
     usual, other = (run("leak", file, "--cm", "0,0,1.35", *more, "--json") for more in ([], loose))
     known = other.record["settings"]["one_sigma_of_what_is_known"]

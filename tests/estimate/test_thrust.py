@@ -348,7 +348,14 @@ def test_nothing_fires_no_mass_and_other_refusals(day28, burn):
         thrust(tlm, CASSINI, method="guess")
     with pytest.raises(BadInput, match="no thrusters"):
         thrust(tlm, load_craft("iss"))
-    for bad in ({"fall_s": -1.0}, {"pulse_scatter": 2.0}, {"center_sigma_m": (0, 1, 1)}, {"mass_kg": 0.0}, {"unlike": 0.0}, {"spin_share": 1.0}):
+    for bad in (
+        {"fall_s": -1.0},
+        {"pulse_scatter": 2.0},
+        {"center_sigma_m": (0, 1, 1)},
+        {"mass_kg": 0.0},
+        {"unlike": 0.0},
+        {"spin_share": 1.0},
+    ):
         with pytest.raises(BadInput):
             priors_for(CASSINI, **bad)
 
@@ -397,7 +404,21 @@ def test_program_takes_what_is_known(file28):
     """Alike thrusters and an inertia known worse: both are in the JSON, and the sigmas follow."""
     usual, alike = (
         run("thrust", file28, "--cm", "0,0,1.35", "--json", *more).record
-        for more in ([], ["--unlike", "0.001", "--spin-sigma", "0.02", "--inertia-sigma", "0.05", "--mass", "3160 kg", "--mass-sigma", "0.01"])
+        for more in (
+            [],
+            [
+                "--unlike",
+                "0.001",
+                "--spin-sigma",
+                "0.02",
+                "--inertia-sigma",
+                "0.05",
+                "--mass",
+                "3160 kg",
+                "--mass-sigma",
+                "0.01",
+            ],
+        )
     )
     assert alike["priors"]["thrusters_unlike"] == 0.001 and alike["priors"]["mass_kg"] == [3160.0, pytest.approx(31.6)]
     assert alike["priors"]["wheel_inertia_share"] == 0.02 and alike["priors"]["inertia_share"] == 0.05

@@ -81,9 +81,11 @@ def test_the_sound_event_has_no_fault(sound):
 @pytest.mark.parametrize("method", ["joint", "printed"])
 def test_branch_that_fires_uncounted_is_refused_by_thrust(uncounted, swapped, method):
     for tlm in (uncounted, without(uncounted, "thruster_branch"), without(swapped, "thruster_branch")):
-        with pytest.raises(BadInput, match=r"while no on-time rises: thrusters fire that are not counted.*other branch"):
+        with pytest.raises(
+            BadInput, match=r"while no on-time rises: thrusters fire that are not counted.*other branch"
+        ):
             thrust(tlm, CASSINI, method=method)
-    with pytest.raises(BadInput, match="branch changes in this record .from A to B by 400 s"):
+    with pytest.raises(BadInput, match=r"branch changes in this record .from A to B by 400 s"):
         thrust(swapped, CASSINI, method=method)
 
 
@@ -111,7 +113,7 @@ def test_branch_under_the_others_names_shows_in_the_thrust():
 
 
 def test_names_exchanged_two_and_two_are_refused(sound):
-    with pytest.raises(BadInput, match="contradict each other.*exchanging Y1 with Y2 and Y3 with Y4"):
+    with pytest.raises(BadInput, match=r"contradict each other.*exchanging Y1 with Y2 and Y3 with Y4"):
         thrust(renamed(sound, {"Y1": "Y2", "Y2": "Y1", "Y3": "Y4", "Y4": "Y3"}), CASSINI)
 
 
@@ -122,13 +124,13 @@ def test_the_alternative_is_always_named():
     craft = load_craft("cassini", cm=(0, 0, 1.35))
     for method in ("likelihood", "threshold"):
         assert leak(tlm, craft, method=method).alternative == "Y4 of branch B"
-    both = tuple(
-        t.model_copy(update={"name": t.name + b, "branch": b}) for b in "AB" for t in craft.thrusters
-    )
+    both = tuple(t.model_copy(update={"name": t.name + b, "branch": b}) for b in "AB" for t in craft.thrusters)
     sixteen = craft.model_copy(update={"thrusters": both, "thruster_controller": None})
     named = leak(without(tlm, "on_time", "pulse_count"), sixteen)
     assert {named.thruster, named.alternative.split()[0]} == {"Y4A", "Y4B"}
-    unnamed = craft.model_copy(update={"thrusters": tuple(t.model_copy(update={"branch": ""}) for t in craft.thrusters)})
+    unnamed = craft.model_copy(
+        update={"thrusters": tuple(t.model_copy(update={"branch": ""}) for t in craft.thrusters)}
+    )
     assert leak(tlm, unnamed).alternative is None
 
 
@@ -199,7 +201,9 @@ def test_declared_wraps_are_taken_up(sound, tmp_path):
     text = '[time]\ncolumn = "time"\nformat = "s"\nepoch = "2005-01-28T00:00:00"\n\n' + "\n".join(entries)
     found = {}
     for declared in (True, False):
-        wraps = {"WRAP64": 'wrap = "64 count"', "WRAP32": 'wrap = "32 count"'} if declared else {"WRAP64": "", "WRAP32": ""}
+        wraps = (
+            {"WRAP64": 'wrap = "64 count"', "WRAP32": 'wrap = "32 count"'} if declared else {"WRAP64": "", "WRAP32": ""}
+        )
         out = text
         for key, value in wraps.items():
             out = out.replace(key, value)

@@ -256,7 +256,9 @@ def test_law_control_passes_from_wheels_to_thrusters_and_back():
     assert np.abs(error).max() < 2.1e-3 and np.abs(error[:, t > 640]).max() < 2e-5
     mode = flight.telemetry.channel("control_mode")
     assert set(mode.values) == {"RWA", "RCS"}
-    assert np.array_equal(mode.values == "RCS", inside[np.rint(flight.telemetry.seconds(mode.tai_ns) / period).astype(int)])
+    assert np.array_equal(
+        mode.values == "RCS", inside[np.rint(flight.telemetry.seconds(mode.tai_ns) / period).astype(int)]
+    )
 
 
 def test_law_each_bed_has_its_own_warmth_and_telemetry_shows_it():
@@ -276,7 +278,10 @@ def test_law_each_bed_has_its_own_warmth_and_telemetry_shows_it():
 def test_law_a_swap_of_branches_changes_counters_and_thrust_alone():
     """Both branches sit in one place: the counters of the one stop where those of the other go on."""
     swap = [{"start": "120 s", "branch": "B", "thrust": "0.6 N"}]
-    flights = {c: fly("wheel-bias-day28", branch_swaps=swap, thrusters={"counted_branch": c, "pulse_scatter": 0.0}) for c in "AB"}
+    flights = {
+        c: fly("wheel-bias-day28", branch_swaps=swap, thrusters={"counted_branch": c, "pulse_scatter": 0.0})
+        for c in "AB"
+    }
     a, b = (flights[c].telemetry.channel("on_time_Y1").values for c in "AB")
     fired = flights["A"].truth.thrusters
     assert np.all(np.diff(a[8:]) == 0) and np.all(b[:8] == 0) and b[-1] > 3

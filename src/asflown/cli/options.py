@@ -17,7 +17,9 @@ START = typer.Option(None, "--start", help="Start of the window: seconds from th
 STOP = typer.Option(None, "--stop", help="End of the window: seconds from the epoch, or UTC.")
 KEEP_IN = typer.Option(None, "--store", help="Keep the result in a trend store: a path (SQLite) or a URL.")
 KEEP_AS = typer.Option(None, "--id", help="Its name in the store; the date unless given.")
-UNLIKE = typer.Option(None, "--unlike", help="One sigma of one thruster against the others, as a share; 0.05 (leak: 0.03).")
+UNLIKE = typer.Option(
+    None, "--unlike", help="One sigma of one thruster against the others, as a share; 0.05 (leak: 0.03)."
+)
 INERTIA_SIGMA = typer.Option(None, "--inertia-sigma", help="One sigma of the inertia, as a share; 0.01.")
 SPIN_SIGMA = typer.Option(None, "--spin-sigma", help="One sigma of a wheel's spin inertia, as a share; 0.0024.")
 JSON = typer.Option(False, "--json", help="One JSON object on standard output.")

@@ -116,7 +116,8 @@ def firings_of(telemetry: Telemetry, craft: Craft) -> Firings:
     broken |= limited[1:] | limited[:-1]
     if broken.all():
         raise BadInput(
-            "no two neighbouring instants have momentum and on-times that are known: " + "; ".join([*of_wheels, *doubts]),
+            "no two neighbouring instants have momentum and on-times that are known: "
+            + "; ".join([*of_wheels, *doubts]),
             file=telemetry.source or None,
             remedy="Take a record, or a span of it, in which counters and wheels stay within their ranges.",
         )

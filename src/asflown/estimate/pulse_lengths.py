@@ -15,6 +15,10 @@ import numpy as np
 _INTERVALS, _MOST = 2, 60
 
 
+#: A thruster burns where it is on for more than this share of the time, and is never off below this share.
+_BURNING, _NEVER_OFF = 0.5, 0.005
+
+
 @dataclass(frozen=True)
 class Lengths:
     """At the counters' instants (M,).  ``squares`` (M, j): of all pulses' lengths, added up [s2]; ``short``: of those that are not
@@ -53,6 +57,20 @@ def lengths_of(on_time_s, pulses) -> Lengths:
         _so_far(np.array(long).reshape(len(long), len(steps)).T),
         np.array(thruster, int),
     )
+
+
+def weak_because_lasting(on_time_s, interval_s, scatter: float) -> np.ndarray:
+    """By how much what a thruster gave in a burn may lie below the mean of its pulses, as a share of all it gave, (j,).
+
+    From on-times (M, j) in intervals (M,) [s].  A thruster off for a share x of the burn is the stronger one of its pair by x; a pulse
+    stronger by d lasts as 1 / (x + d), so that weighted by length the mean of d is - scatter^2 / x, as long as x is the larger.
+    One that is never off is followed as one pulse."""
+    on, room = np.asarray(on_time_s, float), np.asarray(interval_s, float)[:, None]
+    burning = on > _BURNING * room
+    burnt, span = (on * burning).sum(axis=0), (room * burning).sum(axis=0)
+    off = 1 - burnt / np.maximum(span, 1e-300)
+    weak = np.where((burnt > 0) & (off > _NEVER_OFF), scatter**2 / np.hypot(off, max(scatter, 1e-12)), 0.0)
+    return weak * burnt / np.maximum(on.sum(axis=0), 1e-300)
 
 
 def _so_far(steps) -> np.ndarray:

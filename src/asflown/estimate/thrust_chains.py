@@ -13,8 +13,10 @@ import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from ..dynamics.pulses import Valve, expected_effective
+from ..kit.timeline import NS
 from .counters import Known
 from .firings import Firings
+from .pulse_lengths import weak_because_lasting
 
 #: Quiet steps from which the samples' noise is taken; with fewer it is what the fit leaves.
 _QUIET = 12
@@ -48,7 +50,10 @@ class Chain:
     used: np.ndarray  # (K,) bool
     step_s: float
     record: int = 1  # its pulses are those of all chains of that record
-    long_of: np.ndarray = field(default_factory=lambda: np.empty(0, int))  # (L,): thrusters of pulses followed one by one
+    long_of: np.ndarray = field(
+        default_factory=lambda: np.empty(0, int)
+    )  # (L,): thrusters of pulses followed one by one
+    weak: np.ndarray | None = None  # (j,): share by which what was given may lie below the mean of its pulses
     sample_sigma: np.ndarray | None = None  # (K + 1,): noise of each sample where it is known
     nuisances: tuple[Nuisance, ...] = field(default=())
 
@@ -209,4 +214,7 @@ def momentum_chain(f: Firings, priors, number: int) -> Chain:
         nuisances=tuple(nuisances),
         record=number,
         long_of=f.counters.lengths.thruster,
+        weak=weak_because_lasting(
+            np.diff(f.counters.on_time_s, axis=0), np.diff(f.counters.tai_ns) / NS, priors.pulse_scatter
+        ),
     )

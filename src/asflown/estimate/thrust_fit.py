@@ -121,6 +121,7 @@ def fit_thrust(chains: list[Chain], names: tuple[str, ...], valve: Valve, priors
     widened = max(chi / freedom, 1.0) if chi > chi2.isf(_CHANCE, freedom) else 1.0
     inverse = np.einsum("u,uij->ij", weight, np.array([c for _, c, _ in parts]))
     shifts = {n: -sigma * (inverse @ beside[:, q]) for q, (n, sigma) in enumerate(model.considered.items())}
+    shifts["pulses that last"] = model.lasting(values)
     covariance = widened * np.einsum("u,uij->ij", weight, spread)
     covariance += sum((np.outer(s, s) for s in shifts.values()), np.zeros_like(covariance))
     return Fit(
@@ -201,6 +202,17 @@ class _Model:
 
     def total_effective(self, x) -> np.ndarray:
         return np.sum([c.effective(self._valve(x)).sum(axis=0) for c in self.chains], axis=0)[self.fired]
+
+    def lasting(self, x) -> np.ndarray:
+        """Shift of the parameters where what lasts of a burn is weak, (P,): its size is known, and that it is there not quite."""
+        valve, gave, weak = self._valve(x), 0.0, 0.0
+        for c in self.chains:
+            if c.weak is not None:
+                own = c.effective(valve).sum(axis=0)
+                gave, weak = gave + own, weak + own * c.weak
+        shift = np.zeros(len(x))
+        shift[: self.thrusts] = -x[: self.thrusts] * (weak / np.where(gave > 0, gave, 1.0))[self.fired]
+        return shift
 
     def predicted(self, c: Chain, x) -> tuple[np.ndarray, np.ndarray]:
         """Steps (K, d) of a chain, and what each parameter changes in them, (K, d, P)."""

@@ -43,7 +43,9 @@ def stopped(subject: Subject) -> list[str]:
         longest = max(runs(top), key=lambda s: s.stop - s.start)
         others = size[~top]
         if longest.stop - longest.start >= _STILL and len(np.unique(others)) > _NOISY * max(len(others), 1):
-            first, last = (subject.telemetry.describe_time(int(c.usable.tai_ns[k])) for k in (longest.start, longest.stop - 1))
+            first, last = (
+                subject.telemetry.describe_time(int(c.usable.tai_ns[k])) for k in (longest.start, longest.stop - 1)
+            )
             doubts.append(
                 f"the reading of wheel {wheel.name} stands still at its largest, {size.max() * 30 / np.pi:.0f} rpm, from {first} to "
                 f"{last}: if it stops there while the wheel does not (saturation), momentum is missing. Narrow the span, or give the "

@@ -172,8 +172,9 @@ class CatalystBeds(Part):
     cold_fall: Second = Field(default=0.090, ge=0)
     heating: Second = Field(default=2.0, gt=0)
     cooling: Second = Field(default=900.0, gt=0)
-    cold_temperature: Kelvin = Field(default=420.0, gt=0)  # what telemetry says of a bed at rest, kept warm by its heater
-    hot_temperature: Kelvin = Field(default=900.0, gt=0)  # and of one that fires; both assumed
+    # what telemetry says of a bed that its heater keeps warm, and of one that fires; assumed
+    cold_temperature: Kelvin = Field(default=420.0, gt=0)  # type: ignore[valid-type]
+    hot_temperature: Kelvin = Field(default=900.0, gt=0)  # type: ignore[valid-type]
 
 
 class ThrusterUse(Part):

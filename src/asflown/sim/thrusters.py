@@ -202,7 +202,8 @@ def thruster_readings(truth: ThrusterTruth, scenario: Scenario, craft: Craft) ->
     if (truth.branch != "").all():
         readings["thruster_branch"] = truth.branch
     beds = use.catalyst_beds or CatalystBeds()
-    warmth = beds.hot_temperature + truth.chill * (beds.cold_temperature - beds.hot_temperature)
+    cold, hot = float(beds.cold_temperature), float(beds.hot_temperature)
+    warmth = hot + truth.chill * (cold - hot)
     readings |= axes_of("catbed_temperature", warmth, truth.names)
     if craft.blow_down is not None:
         thrust = use.thrust or craft.thrust_at(scenario.epoch_ns)
