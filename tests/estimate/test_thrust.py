@@ -296,7 +296,9 @@ def test_recovery_pulls_are_unit_normal_with_the_truth_from_the_priors():
     assert np.std(alone[:, :4], axis=0) == pytest.approx(1.0, abs=0.2)
     assert abs(alone[:, 4].mean()) < 0.01
     assert np.std(both[:, 1:4], axis=0) == pytest.approx(1.0, abs=0.2)
-    assert np.sqrt(np.mean(both[:, 0] ** 2)) == pytest.approx(1.0, abs=0.2)  # what lasts is weak: low, and the sigma holds it
+    assert np.sqrt(np.mean(both[:, 0] ** 2)) == pytest.approx(
+        1.0, abs=0.2
+    )  # what lasts is weak: low, and the sigma holds it
     assert np.std(both[:, 4]) < 0.006
 
 

@@ -145,6 +145,7 @@ def velocity_chain(
         step_s=step_s,
         record=number,
         long_of=counters.lengths.thruster,
+        weak=counters.weak(priors.pulse_scatter),
         sample_sigma=np.where(ticking, tick_sigma, scale / np.sqrt(12)),
         nuisances=(Nuisance(f"accelerometer bias of record {number}", np.diff(t)[:, None], _ANY_BIAS),),
     )

@@ -13,7 +13,7 @@ from ..kit.errors import BadInput, some_of
 from ..kit.timeline import NS
 from ..telemetry.telemetry import Channel, Telemetry
 from .pulse_counts import Guess, guess_pulses
-from .pulse_lengths import Lengths, lengths_of
+from .pulse_lengths import Lengths, lengths_of, weak_because_lasting
 from .subject import Subject
 
 #: After a pulse's order, what it gives is not all there for up to so long. [s]
@@ -68,6 +68,10 @@ class Counters:
     @cached_property
     def lengths(self) -> Lengths:
         return lengths_of(self.on_time_s, self.pulses)
+
+    def weak(self, scatter: float) -> np.ndarray:
+        """Share by which what each thruster gave may lie below the mean of its pulses, (j,)."""
+        return weak_because_lasting(np.diff(self.on_time_s, axis=0), np.diff(self.tai_ns) / NS, scatter)
 
     def at(self, tai_ns) -> Known:
         """At instants within the counters' span: between two samples all is in proportion to time."""

@@ -126,7 +126,7 @@ def _joint(telemetry: list[Telemetry], craft: Craft, _: str, priors: Priors) -> 
     left = [r for c, r in zip(chains, fit.left, strict=True) if c.turn is not None]
     weights = fit.mean_weights
     parts = {"fall time": ("fall",), "spin inertia": ("spin inertia",), "inertia": ("inertia",), "centre of mass": ("center",),
-             "mass": ("mass",), "pulses not counted": ("pulses not",), "pulses of minutes": ("pulse ",), "pulses that last": ("pulses that",)}  # fmt: skip
+             "mass": ("mass",), "pulses not counted": ("pulses not",), "pulses of minutes": ("pulse ",), "pulses that last": ("lasting",)}  # fmt: skip
     shares = {label: fit.share(weights, *keys) for label, keys in parts.items()}
     mean, mean_sigma = fit.mean()
     value = {n: fit.value(f"thrust {n}") if n in fit.fired else None for n in names}

@@ -13,10 +13,8 @@ import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from ..dynamics.pulses import Valve, expected_effective
-from ..kit.timeline import NS
 from .counters import Known
 from .firings import Firings
-from .pulse_lengths import weak_because_lasting
 
 #: Quiet steps from which the samples' noise is taken; with fewer it is what the fit leaves.
 _QUIET = 12
@@ -49,11 +47,9 @@ class Chain:
     known: Known  # at the samples, (K + 1, j) each
     used: np.ndarray  # (K,) bool
     step_s: float
-    record: int = 1  # its pulses are those of all chains of that record
-    long_of: np.ndarray = field(
-        default_factory=lambda: np.empty(0, int)
-    )  # (L,): thrusters of pulses followed one by one
-    weak: np.ndarray | None = None  # (j,): share by which what was given may lie below the mean of its pulses
+    record: int  # its pulses are those of all chains of that record
+    long_of: np.ndarray  # (L,): thrusters of pulses followed one by one
+    weak: np.ndarray  # (j,): share by which what was given may lie below the mean of its pulses
     sample_sigma: np.ndarray | None = None  # (K + 1,): noise of each sample where it is known
     nuisances: tuple[Nuisance, ...] = field(default=())
 
@@ -214,7 +210,5 @@ def momentum_chain(f: Firings, priors, number: int) -> Chain:
         nuisances=tuple(nuisances),
         record=number,
         long_of=f.counters.lengths.thruster,
-        weak=weak_because_lasting(
-            np.diff(f.counters.on_time_s, axis=0), np.diff(f.counters.tai_ns) / NS, priors.pulse_scatter
-        ),
+        weak=f.counters.weak(priors.pulse_scatter),
     )

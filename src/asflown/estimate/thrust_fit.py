@@ -22,6 +22,8 @@ _UNLIKE = np.geomspace(0.002, 0.3, 11)
 #: Flat prior on the thrusters' mean: its sigma. [N]
 _ANY_THRUST = 1e4
 _ROUNDS = 12
+#: What lasts of a burn is weak by a share that is known (Chain.weak) times something between none and all: its sigma and mean.
+_LASTING, _HALF = "lasting", 0.5
 #: Scatter from pulse to pulse below which it is none: the least that a pulse followed by itself is given.
 _SCATTER = 1e-6
 #: Chance below which what is left over is more than the noise taken for it.
@@ -121,7 +123,6 @@ def fit_thrust(chains: list[Chain], names: tuple[str, ...], valve: Valve, priors
     widened = max(chi / freedom, 1.0) if chi > chi2.isf(_CHANCE, freedom) else 1.0
     inverse = np.einsum("u,uij->ij", weight, np.array([c for _, c, _ in parts]))
     shifts = {n: -sigma * (inverse @ beside[:, q]) for q, (n, sigma) in enumerate(model.considered.items())}
-    shifts["pulses that last"] = model.lasting(values)
     covariance = widened * np.einsum("u,uij->ij", weight, spread)
     covariance += sum((np.outer(s, s) for s in shifts.values()), np.zeros_like(covariance))
     return Fit(
@@ -166,6 +167,8 @@ class _Model:
         }
         own |= dict.fromkeys(self.uncounted, 1.0)
         own |= {n: max(priors.pulse_scatter, _SCATTER) for c in chains for n in c.long}
+        if any(c.weak.any() for c in chains):
+            own[_LASTING] = _HALF
         self.names = [f"thrust {names[k]}" for k in fired] + [
             "mean thrust",
             "fall",
@@ -179,6 +182,8 @@ class _Model:
     def start(self) -> np.ndarray:
         """One thrust for all, by least squares with everything else as it is thought to be."""
         x = np.r_[np.zeros(self.thrusts + 1), self.priors.fall_s, self.priors.center_m, np.zeros(len(self.sigmas) - 4)]
+        if _LASTING in self.names:
+            x[self.names.index(_LASTING)] = _HALF
         u, v = [], []
         for c in self.chains:
             given = np.einsum("kdj,kj->kd", c.arms(self._center(x)), c.effective(self._valve(x)))
@@ -203,17 +208,6 @@ class _Model:
     def total_effective(self, x) -> np.ndarray:
         return np.sum([c.effective(self._valve(x)).sum(axis=0) for c in self.chains], axis=0)[self.fired]
 
-    def lasting(self, x) -> np.ndarray:
-        """Shift of the parameters where what lasts of a burn is weak, (P,): its size is known, and that it is there not quite."""
-        valve, gave, weak = self._valve(x), 0.0, 0.0
-        for c in self.chains:
-            if c.weak is not None:
-                own = c.effective(valve).sum(axis=0)
-                gave, weak = gave + own, weak + own * c.weak
-        shift = np.zeros(len(x))
-        shift[: self.thrusts] = -x[: self.thrusts] * (weak / np.where(gave > 0, gave, 1.0))[self.fired]
-        return shift
-
     def predicted(self, c: Chain, x) -> tuple[np.ndarray, np.ndarray]:
         """Steps (K, d) of a chain, and what each parameter changes in them, (K, d, P)."""
         F, valve, K = self._full(x), self._valve(x), len(c.steps)
@@ -227,6 +221,8 @@ class _Model:
         own = effective.copy()  # with what pulses of minutes give more or less than the others
         for k, (j, on) in longs.items():
             own[:, j] += x[k] * on
+        if _LASTING in self.names:
+            own -= x[self.names.index(_LASTING)] * c.weak * effective
         per_newton = arms * own[:, None, :]
         columns = np.zeros((K, c.width, len(x)))
         steps = (per_newton * F).sum(axis=2)
@@ -235,6 +231,8 @@ class _Model:
         columns[:, :, self.thrusts + 1] = (arms * ((later - effective) / 1e-5)[:, None, :] * F).sum(axis=2)
         for k, moved in enumerate(c.arms_by_center()):
             columns[:, :, self.thrusts + 2 + k] = (moved * (own * F)[:, None, :]).sum(axis=2)
+        if _LASTING in self.names:
+            columns[:, :, self.names.index(_LASTING)] = -(arms * (effective * c.weak * F)[:, None, :]).sum(axis=2)
         for k, (j, on) in longs.items():
             columns[:, :, k] = arms[:, :, j] * (F[j] * on)[:, None]
         for name, g in groups.items():
@@ -287,4 +285,6 @@ class _Model:
         precision[np.arange(j + 1, size), np.arange(j + 1, size)] = 1 / self.sigmas**2
         centre[j + 1] = self.priors.fall_s
         centre[j + 2 : j + 5] = self.priors.center_m
+        if _LASTING in self.names:
+            centre[self.names.index(_LASTING)] = _HALF
         return precision, centre, 0.5 * j * np.log(one)
