@@ -15,7 +15,7 @@ import numpy as np
 _INTERVALS, _MOST = 2, 60
 
 
-#: A thruster burns where it is on for more than this share of the time, and is never off below this share.
+#: A thruster burns where it is on for more than this share of the time, if most of its on-time is so; never off is below this share.
 _BURNING, _NEVER_OFF = 0.5, 0.005
 
 
@@ -68,8 +68,9 @@ def weak_because_lasting(on_time_s, interval_s, scatter: float) -> np.ndarray:
     on, room = np.asarray(on_time_s, float), np.asarray(interval_s, float)[:, None]
     burning = on > _BURNING * room
     burnt, span = (on * burning).sum(axis=0), (room * burning).sum(axis=0)
+    burns = burnt > _BURNING * on.sum(axis=0)
     off = 1 - burnt / np.maximum(span, 1e-300)
-    weak = np.where((burnt > 0) & (off > _NEVER_OFF), scatter**2 / np.hypot(off, max(scatter, 1e-12)), 0.0)
+    weak = np.where(burns & (off > _NEVER_OFF), scatter**2 / np.hypot(off, max(scatter, 1e-12)), 0.0)
     return weak * burnt / np.maximum(on.sum(axis=0), 1e-300)
 
 
