@@ -94,6 +94,7 @@ def test_branch_that_fires_uncounted_is_told_by_leak(uncounted, swapped):
         result = leak(tlm, CASSINI, thrust_N=0.699)
         assert result.alarm and said(result, "together would", "other branch", "Y1", "Y3")
         assert result.alternative == f"{result.thruster} of branch B"
+        assert {"Y1", "Y3"} <= set(result.together) and "momentum as of several thrusters" in str(result)
     assert said(leak(swapped, CASSINI, thrust_N=0.699), "branch changes from A to B by 400 s")
     assert said(leak(uncounted, CASSINI, thrust_N=0.699), "branch B is in use", "describes branch A")
 

@@ -19,7 +19,7 @@ from ..craft.model import Craft
 from ..kit.errors import BadInput, some_of
 from ..kit.timeline import NS, utc_label
 from ..telemetry.telemetry import Telemetry
-from .leak_doubts import branch_doubts, loss_doubt, pointing_doubt
+from .leak_doubts import branch_doubts, loss_doubt, pointing_doubt, together
 from .leak_error_monitor import ErrorMonitor, error_monitor, threshold_at_rate
 from .leak_filter import Evidence, Monitor, threshold_for
 from .leak_firing import geometry_of
@@ -146,7 +146,7 @@ class LeakWatch:
         at_window = windows.get(self.window_s)
         found: dict[str, Any] = dict.fromkeys(
             ("kind", "thruster", "posterior", "onset_s", "onset_95_s", "torque_Nm", "torque_sigma_Nm", "leak_N",
-             "leak_sigma_N", "loss", "loss_sigma")
+             "leak_sigma_N", "loss", "loss_sigma", "together")
         )  # fmt: skip
         doubts = [*view.subject.doubts, *steps.doubts, *self._about(view)]
         if at_window is None:
@@ -154,14 +154,18 @@ class LeakWatch:
                 f"up to its end or its alarm the record is shorter than {self.window_s:g} s: the smallest leak found by then is not given"
             )
         if alarm is not None:
-            doubts += [*branch_doubts(tlm, self.craft), *stopped(view.subject)]
+            doubts = [
+                *branch_doubts(tlm, self.craft),
+                *stopped(view.subject),
+                *doubts,
+            ]  # what may be wrong with it comes first
         if alarm is not None and self.method == "threshold":
             found |= {"kind": "leak", "thruster": papers.thruster}
             doubts.append("the papers' monitor gives no probability, and takes any momentum not ordered for a leak")
         elif alarm is not None and monitor.best is not None:
             told, more = self._told(monitor.best, t, view.thrust_N, tlm.epoch_ns)
             found |= told
-            doubts += more
+            doubts = [*more, *doubts]
         return LeakResult(
             craft=self.craft.name,
             epoch=tlm.epoch_label,
@@ -263,7 +267,10 @@ class LeakWatch:
         better = 0.5 * float(e.free_d[b] @ free) - 0.5 * float(e.d[b, h] ** 2 / e.c[b, h])
         gained = float(np.linalg.norm(free)) * (t[e.instant] - since[b])
         one = pulse_Nms(self.craft, self.craft.thrusters, self.geometry.shortest_s, epoch_ns)
-        doubts = [pointing_doubt(better, free, C, self.geometry, gained / one)]
+        mixed = together(better, free, C, self.geometry)
+        doubts = [pointing_doubt(better, mixed, gained / one)]
+        if len(mixed) > 1:
+            found["together"] = mixed
         if weak:
             found |= {"loss": size, "loss_sigma": sigma}
             doubts.append(loss_doubt(size, sigma))

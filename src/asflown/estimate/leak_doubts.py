@@ -10,26 +10,32 @@ from ..kit.errors import some_of
 from ..telemetry.telemetry import Telemetry
 from .leak_firing import Geometry
 from .thruster_branch import branch_change, undescribed
+from .uncounted import PULSES
 
 #: Log likelihood ratio of any direction over the best column; noise exceeds it once in 1100.
-_MISFIT = 7.0
+MISFIT = 7.0
 #: A thruster is part of a mixture from this share of its largest on.
 _PART = 0.05
 
 
-def pointing_doubt(better: float, torque_Nm, precision, geometry: Geometry, pulses: float) -> str | None:
-    """Where a torque (3,) known to ``precision`` (3, 3), of any direction, explains by so much ``better`` than the best thruster.
-
-    ``pulses``: how many its momentum is worth."""
-    if better <= _MISFIT:
-        return None
+def together(better: float, torque_Nm, precision, geometry: Geometry) -> list[str]:
+    """Thrusters that would make a torque (3,) [N m] between them, where it is so much ``better`` (log likelihood ratio) with a
+    direction of its own than by the best of them alone; none where one will do.  ``precision`` (3, 3): of the torque."""
+    if better <= MISFIT:
+        return []
     root = np.linalg.cholesky(precision).T
     thrust, _ = nnls(root @ geometry.columns, root @ torque_Nm)
-    mixed = [n for n, f in zip(geometry.names, thrust, strict=True) if f > _PART * thrust.max()]
+    return [n for n, f in zip(geometry.names, thrust, strict=True) if f > _PART * thrust.max()]
+
+
+def pointing_doubt(better: float, mixed: list[str], pulses: float) -> str | None:
+    """Where no one thruster makes the torque.  ``pulses``: how many its momentum is worth."""
+    if better <= MISFIT:
+        return None
     text = f"the torque does not point as any thruster's would (log likelihood ratio {better:.1f}): "
     if len(mixed) > 1:
         text += f"{some_of(mixed)} together would. "
-        if pulses > 4:
+        if pulses > PULSES:
             text += (
                 f"If they fire, as for {pulses:.0f} pulses, they are not counted: those of the other branch, with on-times that are not in the "
                 "file. "
