@@ -17,15 +17,15 @@ from scipy.stats import norm
 
 from ..craft.model import Craft
 from ..kit.errors import BadInput, some_of
-from ..kit.timeline import NS, utc_label
+from ..kit.timeline import NS
 from ..telemetry.telemetry import Telemetry
-from .leak_doubts import branch_doubts, loss_doubt, pointing_doubt, together
+from .leak_doubts import branch_doubts, loss_doubt, noise_doubts, pointing_doubt, thrust_doubts, together
 from .leak_error_monitor import ErrorMonitor, error_monitor, threshold_at_rate
 from .leak_filter import Evidence, Monitor, threshold_for
 from .leak_firing import geometry_of
 from .leak_known import Known
 from .leak_result import LeakResult
-from .leak_samples import AXES_IN_A_LEAK, Noise, Steps, learned_noise, steps_of
+from .leak_samples import Noise, Steps, learned_noise, steps_of
 from .subject import Subject, subject_of
 from .thruster_branch import other_branch
 from .uncounted import PULSES, gained_idle, pulse_Nms, uncounted
@@ -39,10 +39,7 @@ POWER = 0.9  # of the smallest detectable leak
 
 #: Instants that a stream keeps back: a spike is one only once its neighbours are there.
 _HELD_BACK = 3
-_FAR_FROM_KNOWN = 200 * 86_400 * NS  # a thrust from longer ago is doubted
 _SURE = 0.95  # posterior below which the thruster named is doubted
-_FEW_DEGREES = 120
-_FOLLOWING = 3.0  # readings worth one, beyond which a doubt says so
 
 
 def leak(telemetry: Telemetry, craft: Craft, **options) -> LeakResult:
@@ -148,7 +145,9 @@ class LeakWatch:
             ("kind", "thruster", "posterior", "onset_s", "onset_95_s", "torque_Nm", "torque_sigma_Nm", "leak_N",
              "leak_sigma_N", "loss", "loss_sigma", "together")
         )  # fmt: skip
-        doubts = [*view.subject.doubts, *steps.doubts, *self._about(view)]
+        doubts = [*view.subject.doubts, *steps.doubts, *noise_doubts(self._noise, steps)]
+        if self._thrust_N is None and steps.ordered.any():
+            doubts += thrust_doubts(tlm.epoch_ns, self.craft)
         if at_window is None:
             doubts.append(
                 f"up to its end or its alarm the record is shorter than {self.window_s:g} s: the smallest leak found by then is not given"
@@ -295,30 +294,3 @@ class LeakWatch:
     def _alternative(self, thruster: str | None) -> str | None:
         """The thruster of the other branch sits beside this one, and momentum cannot tell them apart."""
         return None if thruster is None else other_branch(thruster, self.craft.thrusters)
-
-    def _about(self, view: _View) -> list[str]:
-        doubts, noise, tlm = [], self._noise, view.subject.telemetry
-        assert noise is not None
-        if noise.degrees < _FEW_DEGREES:
-            doubts.append(
-                f"the noise is learned from readings worth {noise.degrees / AXES_IN_A_LEAK:.0f} independent ones: a larger leak is needed for an alarm"
-            )
-        if noise.alike.max() > _FOLLOWING:
-            doubts.append(
-                f"readings in the holds the noise is learned from follow each other ({noise.alike.max():.0f} are worth one): if something "
-                "moved then, the noise is overstated and small leaks stay hidden"
-            )
-        fires = (view.steps.ordered > 0).any()
-        known = [h.date for h in self.craft.thrust_history]
-        nearest = min(known, key=lambda d: abs(tlm.epoch_ns - d), default=None)
-        if fires and self._thrust_N is None and (nearest is None or abs(tlm.epoch_ns - nearest) > _FAR_FROM_KNOWN):
-            doubts.append(
-                "the thrust is the nominal one: --thrust says it better"
-                if nearest is None
-                else f"the thrust is carried over from {utc_label(nearest)[:10]}, the nearest date known: --thrust says it better"
-            )
-        if not len(view.steps.tai_ns[noise.until :]):
-            doubts.append(
-                "the noise is learned from all of the record: a leak through all of it would count as steady torque"
-            )
-        return doubts

@@ -1,4 +1,4 @@
-"""What else than one leaking or weak thruster would look so: several that fire uncounted, the other branch, a wheel that is full."""
+"""What is not sure of a leak monitor's verdict: its noise, the thrust it believes, and what else than one thruster would look so."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from scipy.optimize import nnls
 
 from ..craft.model import Craft
 from ..kit.errors import some_of
+from ..kit.timeline import NS, utc_label
 from ..telemetry.telemetry import Telemetry
 from .leak_firing import Geometry
+from .leak_samples import AXES_IN_A_LEAK, Noise, Steps
 from .thruster_branch import branch_change, undescribed
 from .uncounted import PULSES
 
@@ -16,6 +18,40 @@ from .uncounted import PULSES
 MISFIT = 7.0
 #: A thruster is part of a mixture from this share of its largest on.
 _PART = 0.05
+
+#: Independent readings times axes below which the noise is said to be little known; and how many worth one are too many.
+_FEW_DEGREES, _FOLLOWING = 120, 3.0
+_FAR_FROM_KNOWN = 200 * 86_400 * NS  # a thrust from longer ago is doubted
+
+
+def noise_doubts(noise: Noise, steps: Steps) -> list[str]:
+    doubts = []
+    if noise.degrees < _FEW_DEGREES:
+        doubts.append(
+            f"the noise is learned from readings worth {noise.degrees / AXES_IN_A_LEAK:.0f} independent ones: a larger leak is needed for an alarm"
+        )
+    if noise.alike.max() > _FOLLOWING:
+        doubts.append(
+            f"readings in the holds the noise is learned from follow each other ({noise.alike.max():.0f} are worth one): if something "
+            "moved then, the noise is overstated and small leaks stay hidden"
+        )
+    if not len(steps.tai_ns[noise.until :]):
+        doubts.append(
+            "the noise is learned from all of the record: a leak through all of it would count as steady torque"
+        )
+    return doubts
+
+
+def thrust_doubts(epoch_ns: int, craft: Craft) -> list[str]:
+    """Of a thrust that nobody said, on a date."""
+    nearest = min((h.date for h in craft.thrust_history), key=lambda d: abs(epoch_ns - d), default=None)
+    if nearest is None:
+        return ["the thrust is the nominal one: --thrust says it better"]
+    if abs(epoch_ns - nearest) <= _FAR_FROM_KNOWN:
+        return []
+    return [
+        f"the thrust is carried over from {utc_label(nearest)[:10]}, the nearest date known: --thrust says it better"
+    ]
 
 
 def together(better: float, torque_Nm, precision, geometry: Geometry) -> list[str]:
