@@ -215,3 +215,12 @@ def test_declared_wraps_are_taken_up(sound, tmp_path):
     assert found[True].mean_thrust_N == pytest.approx(plain.mean_thrust_N, rel=1e-6)
     assert not said(found[True], "falls at")
     assert said(found[False], "falls at", "declare a wrap")
+
+
+def test_slews_on_wheels_are_not_taken_for_firing():
+    """Nothing fires and wheels turn the craft, with an inertia 5 % off: no thruster fires, that is all."""
+    flight = fly("slews-axes", duration="900 s", thrusters={"control": False, "center_of_mass": "0 0 1.35 m"})
+    larger = tuple(1.05 * v for v in (6510, 5333, 3519, -124.8, -38.7, 133.0))
+    for tlm in (flight.telemetry, without(flight.telemetry, "body_rate")):
+        with pytest.raises(BadInput, match="no thruster fires"):
+            thrust(tlm, load_craft("cassini", cm=(0, 0, 1.35), inertia=larger))

@@ -21,7 +21,7 @@ from .counters import Counters, Known, NothingFires, counters_of, step_of
 from .external_samples import Samples, samples_of
 from .subject import Subject, subject_of
 from .thruster_branch import CHANNEL, branch_change, branches_in_use, undescribed
-from .uncounted import PULSES, gained_idle, uncounted
+from .uncounted import PULSES, gained_idle, pulse_Nms, uncounted
 from .wheel_limits import at_limit
 
 #: Pulses a second times this is what a sample soon after some of them counts as not known. [s]
@@ -173,10 +173,12 @@ def _turned(s: Samples) -> Rotation:
 def _idle(subject: Subject, why: NothingFires) -> BadInput:
     """No on-time rises: whether the momentum says otherwise."""
     samples = samples_of(subject)
-    step_s = subject.craft.craft.wheel_controller.period if subject.craft.craft.wheel_controller else 0.125
-    gained, pulses = gained_idle(
-        _turned(samples).apply(samples.momentum), subject.craft.craft, step_s, int(samples.tai_ns[0])
-    )
+    if samples.rates is None:
+        return why
+    craft, turned = subject.craft.craft, _turned(samples)
+    step_s = craft.wheel_controller.period if craft.wheel_controller else 0.125
+    gained = gained_idle(turned.apply(samples.momentum), turned.apply(samples.body))
+    pulses = gained / pulse_Nms(craft, craft.thrusters, step_s, int(samples.tai_ns[0]))
     return uncounted(gained, pulses, "in this record", subject.telemetry.source) if pulses > PULSES else why
 
 

@@ -115,8 +115,10 @@ class LeakWatch:
             if self._noise is None:
                 self._noise = learned_noise(steps, final)
         except BadInput as why:
-            if final and not steps.ordered.any():
-                gained, pulses = gained_idle(steps.residual, self.craft, self.geometry.shortest_s, telemetry.epoch_ns)
+            if final and steps.body_rate.any() and not steps.ordered.any():
+                body = np.einsum("nij,nj->ni", steps.turned, steps.body_rate @ subject.known_inertia())
+                gained = gained_idle(steps.residual, body)
+                pulses = gained / self._pulse_Nms(telemetry.epoch_ns)
                 if pulses > PULSES:
                     raise uncounted(gained, pulses, "in this record", telemetry.source) from why
             raise why.within(telemetry.source) from why.__cause__
@@ -265,7 +267,7 @@ class LeakWatch:
         }  # fmt: skip
         better = 0.5 * float(e.free_d[b] @ free) - 0.5 * float(e.d[b, h] ** 2 / e.c[b, h])
         gained = float(np.linalg.norm(free)) * (t[e.instant] - since[b])
-        one = pulse_Nms(self.craft, self.craft.thrusters, self.geometry.shortest_s, epoch_ns)
+        one = self._pulse_Nms(epoch_ns)
         mixed = together(better, free, C, self.geometry)
         doubts = [pointing_doubt(better, mixed, gained / one)]
         if len(mixed) > 1:
@@ -290,6 +292,9 @@ class LeakWatch:
                 "it is there from the record's beginning: only its size tells it from the steady torque from outside"
             )
         return found, [d for d in doubts if d]
+
+    def _pulse_Nms(self, epoch_ns: int) -> float:
+        return pulse_Nms(self.craft, self.craft.thrusters, self.geometry.shortest_s, epoch_ns)
 
     def _alternative(self, thruster: str | None) -> str | None:
         """The thruster of the other branch sits beside this one, and momentum cannot tell them apart."""

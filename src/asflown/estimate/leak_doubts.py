@@ -18,7 +18,6 @@ from .uncounted import PULSES
 MISFIT = 7.0
 #: A thruster is part of a mixture from this share of its largest on.
 _PART = 0.05
-
 #: Independent readings times axes below which the noise is said to be little known; and how many worth one are too many.
 _FEW_DEGREES, _FOLLOWING = 120, 3.0
 _FAR_FROM_KNOWN = 200 * 86_400 * NS  # a thrust from longer ago is doubted

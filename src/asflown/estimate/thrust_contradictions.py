@@ -13,7 +13,7 @@ from ..kit.timeline import runs
 from .firings import Firings
 from .thrust_printed import balance
 from .thrust_priors import Priors
-from .uncounted import PULSES, pulse_Nms, uncounted
+from .uncounted import PULSES, gained_idle, pulse_Nms, uncounted
 
 #: Share of the momentum gained that one thrust for all leaves unexplained: above it names, places or units are wrong; and to
 #: which share of that an exchange of names must bring it to be told.
@@ -60,11 +60,13 @@ def check_names(f: Firings, priors: Priors) -> None:
 
 
 def check_counted(f: Firings, craft: Craft) -> None:
-    """Raises BadInput where momentum changes as by many pulses while no on-time rises."""
-    steps = np.diff(f.in_space, axis=0)
+    """Raises BadInput where momentum changes as by many pulses while no on-time rises; without body rates nothing is said."""
+    if f.rates is None:
+        return
+    steps, body = np.diff(f.in_space, axis=0), f.turned.apply(f.body)
     ordered = (np.diff(f.known.on_time_s, axis=0) > 0).any(axis=1) | f.broken
     for s in runs(~ordered):
-        gained = float(np.linalg.norm(steps[s].sum(axis=0)))
+        gained = gained_idle(f.in_space[s.start : s.stop + 1], body[s.start : s.stop + 1])
         pulses = gained / pulse_Nms(craft, f.thrusters, f.step_s, f.tai_ns[0])
         if pulses > PULSES and gained > _IDLE * np.linalg.norm(steps, axis=1).sum():
             a, b = (f.telemetry.describe_time(int(f.tai_ns[k])) for k in (s.start, s.stop))

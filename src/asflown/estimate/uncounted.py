@@ -12,6 +12,8 @@ from ..kit.errors import BadInput
 
 #: So many pulses' worth of momentum within one span in which no on-time rises are more than what pulses still owe.
 PULSES = 4.0
+#: Instants at either end over which momentum is averaged, and share by which the inertia may be off.
+_ENDS, _INERTIA = 3, 0.1
 
 
 def uncounted(gained_Nms: float, pulses: float, when: str, source: str) -> BadInput:
@@ -23,10 +25,14 @@ def uncounted(gained_Nms: float, pulses: float, when: str, source: str) -> BadIn
     )
 
 
-def gained_idle(momentum: np.ndarray, craft: Craft, step_s: float, tai_ns: int) -> tuple[float, float]:
-    """Largest change of momentum (N, 3) from the first instant, in axes that do not turn [N m s], and how many pulses that is."""
-    gained = float(np.linalg.norm(momentum - momentum[0], axis=1).max())
-    return gained, gained / pulse_Nms(craft, craft.thrusters, step_s, tai_ns)
+def gained_idle(momentum: np.ndarray, body: np.ndarray) -> float:
+    """Change of momentum (N, 3) from the first instants to the last, in axes that do not turn, beyond what an inertia not quite
+    right makes of the body's own (N, 3). [N m s]"""
+
+    def change(v) -> float:
+        return float(np.linalg.norm(v[-_ENDS:].mean(axis=0) - v[:_ENDS].mean(axis=0)))
+
+    return max(change(momentum) - _INERTIA * change(body), 0.0)
 
 
 def pulse_Nms(craft: Craft, thrusters: Sequence[Thruster], step_s: float, tai_ns: int) -> float:
