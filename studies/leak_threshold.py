@@ -11,8 +11,9 @@ estimate/leak_filter.py.
 import numpy as np
 
 from asflown.craft.load import load_craft
-from asflown.estimate.leak_filter import Known, Monitor
+from asflown.estimate.leak_filter import Monitor
 from asflown.estimate.leak_firing import geometry_of
+from asflown.estimate.leak_known import Known
 from asflown.estimate.leak_samples import Noise, Steps
 
 RECORDS = 1500

@@ -75,7 +75,8 @@ def test_telemetry_pages_examples_are_read(tmp_path):
 def test_simulator_page_lists_every_scenario_key():
     models = (scenario.Scenario, scenario.Triangles, scenario.Constant, scenario.Table, scenario.Plume, scenario.Passage, scenario.Slew,
               scenario.Coast, scenario.DragSpike, scenario.CoverMotion, scenario.Controller, scenario.Sampling, scenario.Gap,
-              scenario.ThrusterUse, scenario.CatalystBeds, scenario.ThrusterFault, scenario.WheelBias, scenario.Burn)  # fmt: skip
+              scenario.ThrusterUse, scenario.CatalystBeds, scenario.ThrusterFault, scenario.WheelBias, scenario.Burn,
+              scenario.ThrusterControl, scenario.BranchSwap)  # fmt: skip
     tables = {
         "slews",
         "coasts",
@@ -88,6 +89,8 @@ def test_simulator_page_lists_every_scenario_key():
         "thrusters",
         "catalyst_beds",
         "thruster_faults",
+        "thruster_control",
+        "branch_swaps",
         "wheel_biases",
         "burns",
     }  # named in the first column

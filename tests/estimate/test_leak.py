@@ -298,6 +298,35 @@ def test_verb_says_it_in_text_json_and_picture(leak_of_z3, tmp_path):
     assert "--cm" in complaint("leak", file)
 
 
+def test_verb_takes_and_shows_what_is_known(leak_of_z3, tmp_path):
+    """A looser torque from outside hides a leak longer; every sigma said is in the JSON and in the text."""
+    file = tmp_path / "t.csv"
+    write_table(leak_of_z3.telemetry, file)
+    loose = [
+        "--torque-sigma",
+        "3e-5 N m",
+        "--torque-walk",
+        "1e-2 N m",
+        "--cm-sigma",
+        "0.1 0.1 0.5 m",
+        "--thrust-sigma",
+        "0.2",
+        "--unlike",
+        "0.05",
+    ]
+    loose += ["--pulse-scatter", "0.02", "--inertia-sigma", "0.02", "--spin-sigma", "0.005"]
+    usual, other = (run("leak", file, "--cm", "0,0,1.35", *more, "--json") for more in ([], loose))
+    known = other.record["settings"]["one_sigma_of_what_is_known"]
+    assert known == {"thrust_share": 0.2, "each_share": 0.05, "pulse_share": 0.02, "center_of_mass_m": [0.1, 0.1, 0.5],
+                     "inertia_share": 0.02, "spin_share": 0.005, "torque_Nm": 3e-5, "torque_in_an_hour_Nm": 1e-2}  # fmt: skip
+    assert usual.record["settings"]["one_sigma_of_what_is_known"]["center_of_mass_m"] == [0.02, 0.02, 0.02]
+    sizes = [r.record["smallest_detectable_Nm"] or np.inf for r in (usual, other)]
+    assert sizes[1] > 1.5 * sizes[0] or other.record["alarm_s"] > usual.record["alarm_s"]
+    assert "taken as known: thrust of all to 20 %, of each to 5 %" in run("leak", file, "--cm", "0,0,1.35", *loose).out
+    assert "--unlike" in complaint("leak", file, "--cm", "0,0,1.35", "--unlike", "1.5")
+    assert "--torque-sigma" in complaint("leak", file, "--cm", "0,0,1.35", "--torque-sigma", "-1 N m")
+
+
 def test_verb_follows_a_file_that_grows(leak_of_z3, tmp_path):
     whole, file = tmp_path / "whole.csv", tmp_path / "grows.csv"
     write_table(leak_of_z3.telemetry, whole)

@@ -235,6 +235,73 @@ def test_law_wheels_run_down_under_thrusters():
     assert np.abs(error).max() < 2.1e-3
 
 
+def test_law_control_passes_from_wheels_to_thrusters_and_back():
+    """Within the span nothing but pulses turns the craft, outside of it nothing but wheels; momentum is what pulses gave."""
+    flight = fly("wheel-bias-handover", noise="none")
+    truth, fired, period = flight.truth, flight.truth.thrusters, 0.125
+    inside = (truth.time_s >= 300) & (truth.time_s < 540)
+    assert np.array_equal(fired.in_control, inside) and not fired.on[~inside].any() and fired.on[inside].any()
+    assert np.all(truth.control_torque_Nm[inside] == 0)
+    turn = rotation(truth.attitude)
+    given = np.diff(fired.impulse_Ns, axis=0) @ fired.arms_m
+    gained = np.cumsum(0.5 * (turn[:-1].apply(given) + turn[1:].apply(given)), axis=0)
+    H = truth.momentum_inertial_Nms
+    assert np.abs(H[1:] - H[0] - gained).max() < 1e-6 * np.abs(gained).max()
+    # brought to the rates ordered, then taken on by the wheels' loop from within the thrusters' deadband
+    bias = np.array([-794, -870, -296])
+    assert truth.wheel_rate_rad_s[round(500 / period)] * 30 / np.pi == pytest.approx(bias, abs=0.2)
+    assert np.abs(truth.wheel_rate_rad_s[-1] * 30 / np.pi - bias).max() < 40
+    error = np.array([flight.telemetry.channel(f"attitude_error_{a}").values for a in "xyz"])
+    t = flight.telemetry.seconds(flight.telemetry.channel("attitude_error_x").tai_ns)
+    assert np.abs(error).max() < 2.1e-3 and np.abs(error[:, t > 640]).max() < 2e-5
+    mode = flight.telemetry.channel("control_mode")
+    assert set(mode.values) == {"RWA", "RCS"}
+    assert np.array_equal(
+        mode.values == "RCS", inside[np.rint(flight.telemetry.seconds(mode.tai_ns) / period).astype(int)]
+    )
+
+
+def test_law_each_bed_has_its_own_warmth_and_telemetry_shows_it():
+    """What fires is hot and answers fast, what rests stays cold: rise and fall of each follow from its own firing."""
+    flight = fly("wheel-bias-handover", noise="none", thrusters={"fall": None, "catalyst_beds": {}})
+    fired, tlm = flight.truth.thrusters, flight.telemetry
+    warm, cold = tlm.channel("catbed_temperature_Y1").values, tlm.channel("catbed_temperature_Y2").values
+    assert np.all(cold == 420) and warm[0] == 420 and 850 < warm.max() < 900 and warm[-1] < warm.max() - 100
+    # between firings a bed cools as exp(-t / 900 s)
+    k = len(warm) - 10
+    assert (warm[-1] - 420) / (warm[k] - 420) == pytest.approx(np.exp(-9 * 16 / 900), rel=1e-9)
+    assert fired.chill[-1, 5] == 1 and fired.chill[:, 4].min() < 0.1
+    psia = 6894.757
+    assert tlm.channel("tank_pressure").values[0] / psia == pytest.approx(255 * (0.699 / 0.69) ** (1 / 0.84), rel=0.01)
+
+
+def test_law_a_swap_of_branches_changes_counters_and_thrust_alone():
+    """Both branches sit in one place: the counters of the one stop where those of the other go on."""
+    swap = [{"start": "120 s", "branch": "B", "thrust": "0.6 N"}]
+    flights = {
+        c: fly("wheel-bias-day28", branch_swaps=swap, thrusters={"counted_branch": c, "pulse_scatter": 0.0})
+        for c in "AB"
+    }
+    a, b = (flights[c].telemetry.channel("on_time_Y1").values for c in "AB")
+    fired = flights["A"].truth.thrusters
+    assert np.all(np.diff(a[8:]) == 0) and np.all(b[:8] == 0) and b[-1] > 3
+    assert a[-1] + b[-1] == fired.on_time_s[-1, 4]
+    thrusts = [p[2] for p in fired.pulses_of("Y1", flights["A"].truth.time_s)]
+    assert sorted(set(np.round(thrusts, 9))) == [0.6, 0.699]
+    state = flights["A"].telemetry.channel("thruster_branch")
+    assert list(state.values) == ["A", "A", "B", "B", "B", "B"]  # every 64 s
+
+
+def test_law_a_wheel_at_its_limit_goes_no_further_under_thruster_control():
+    fast = [{"start": "60 s", "stop": "180 s", "rates": {"RWA1": "-2300 rpm"}}]
+    flight = fly("wheel-bias-day28", wheel_biases=fast)
+    rates = flight.truth.wheel_rate_rad_s[:, 0] * 30 / np.pi
+    assert flight.ended == "reached 360 s" and rates[-1] == pytest.approx(-2020, abs=3)
+    assert rates.min() > -2025
+    back = fly("wheel-bias-day28", wheel_biases=fast, thruster_control=[{"start": "50 s", "stop": "200 s"}])
+    assert back.ended == "wheel RWA1 at its rate limit at 200 s"  # the wheels cannot hold an attitude then
+
+
 def test_thruster_telemetry_is_cumulative_counted_and_on_disk(tmp_path):
     flight = fly("wheel-bias-day28")
     tlm, fired = flight.telemetry, flight.truth.thrusters
@@ -258,6 +325,9 @@ BAD = {
     "an unknown thruster": ("leak", {"thruster_faults": [{"thruster": "Z9", "start": "0 s"}]}),
     "an unknown wheel": ("wheel-bias-fsds", {"wheel_biases": [{"start": "0 s", "stop": "9 s", "rates": {"RWA3": "9 rpm"}}]}),
     "backwards": ("wheel-bias-fsds", {"wheel_biases": [{"start": "9 s", "stop": "0 s", "rates": {"RWA1": "9 rpm"}}]}),
+    "a bias under wheel control": ("wheel-bias-day28", {"thruster_control": [{"start": "0 s", "stop": "100 s"}]}),
+    "control that never is": ("wheel-bias-day28", {"wheel_biases": [], "thrusters": {"control": False}, "thruster_control": [{"start": "0 s", "stop": "9 s"}]}),
+    "a swap without thrusters": ("quiet", {"branch_swaps": [{"start": "0 s", "branch": "B"}]}),
     "no centre of mass": ("quiet", {"thrusters": {}}),
     "no mass": ("leak", {"telemetry": {"accelerometer_count": "1 s"}}),
     "a slow valve": ("wheel-bias-fsds", {"controller": {"period": "4 ms"}, "duration": "1 s"}),

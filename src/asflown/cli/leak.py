@@ -12,9 +12,12 @@ from .options import (
     CRAFT,
     EXCLUDE,
     INERTIA,
+    INERTIA_SIGMA,
     JSON,
+    SPIN_SIGMA,
     START,
     STOP,
+    UNLIKE,
     check_picture,
     craft_from,
     hashes,
@@ -37,8 +40,24 @@ def leak(
         None, "--momentum", help="The papers' monitor's threshold in N m s; by default what gives the same rate."
     ),
     thrust: str = typer.Option(None, "--thrust", help='Of each thruster, as in "0.69 N"; the craft\'s on the date.'),
+    thrust_sigma: float = typer.Option(
+        None, "--thrust-sigma", help="One sigma of all thrusters together, as a share; 0.1."
+    ),
+    unlike: float = UNLIKE,
+    pulse_scatter: float = typer.Option(
+        None, "--pulse-scatter", help="One sigma of one pulse against another, as a share; 0.03."
+    ),
     cm: str = CM,
+    cm_sigma: str = typer.Option(None, "--cm-sigma", help='Its sigma, "0.02 0.02 0.02 m" unless given.'),
     inertia: str = INERTIA,
+    inertia_sigma: float = INERTIA_SIGMA,
+    spin_sigma: float = SPIN_SIGMA,
+    torque_sigma: str = typer.Option(
+        None, "--torque-sigma", help='Of the steady torque from outside, "3e-6 N m" unless given.'
+    ),
+    torque_walk: str = typer.Option(
+        None, "--torque-walk", help='By how much that walks in an hour, "1e-6 N m" unless given.'
+    ),
     start: str = START,
     stop: str = STOP,
     channels: Path = CHANNELS,
@@ -52,7 +71,8 @@ def leak(
 ) -> None:
     """Leaking and weak thrusters, from momentum that orders do not explain.  Exit code 3 on an alarm."""
     from asflown.estimate.leak import LeakWatch
-    from asflown.kit.quantities import quantity
+    from asflown.estimate.leak_known import known_for
+    from asflown.kit.quantities import numbers, quantity
 
     check_picture(plot)
     ship = craft_from(craft, inertia, cm)
@@ -63,6 +83,16 @@ def leak(
         window_s=window,
         thrust_N=None if thrust is None else quantity(thrust, "N"),
         momentum_Nms=momentum,
+        known=known_for(
+            thrust_share=thrust_sigma,
+            each_share=unlike,
+            pulse_share=pulse_scatter,
+            center_of_mass_m=None if cm_sigma is None else numbers(cm_sigma, "m", 3),
+            inertia_share=inertia_sigma,
+            spin_share=spin_sigma,
+            torque_Nm=None if torque_sigma is None else quantity(torque_sigma, "N m"),
+            torque_in_an_hour_Nm=None if torque_walk is None else quantity(torque_walk, "N m"),
+        ),
     )
     if follow:
         _followed(watch, file, patience, lambda part: telemetry_from(part, channels, exclude, start, stop, ship)[0])
@@ -78,7 +108,9 @@ def leak(
         say(f"wrote {plot}")
     if json:
         options = {"craft": craft, "method": method, "false_alarms": false_alarms, "window": window, "momentum": momentum,
-                   "thrust": thrust, "cm": cm, "inertia": inertia, "start": start, "stop": stop, "follow": follow}  # fmt: skip
+                   "thrust": thrust, "thrust_sigma": thrust_sigma, "unlike": unlike, "pulse_scatter": pulse_scatter, "cm": cm,
+                   "cm_sigma": cm_sigma, "inertia": inertia, "inertia_sigma": inertia_sigma, "spin_sigma": spin_sigma,
+                   "torque_sigma": torque_sigma, "torque_walk": torque_walk, "start": start, "stop": stop, "follow": follow}  # fmt: skip
         print_json({"command": "leak"} | result.record() | {"provenance": provenance(inputs | hashes(craft), options)})
     else:
         print(result)

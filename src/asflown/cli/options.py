@@ -18,6 +18,11 @@ STOP = typer.Option(None, "--stop", help="End of the window: seconds from the ep
 KEEP_IN = typer.Option(None, "--store", help="Keep the result in a trend store: a path (SQLite) or a URL.")
 KEEP_AS = typer.Option(None, "--id", help="Its name in the store; the date unless given.")
 PLOT_DIR = typer.Option(None, "--plot-dir", help="Draw the figures into this folder (SVG).")
+UNLIKE = typer.Option(
+    None, "--unlike", help="One sigma of one thruster against the others, as a share; 0.05 (leak: 0.03)."
+)
+INERTIA_SIGMA = typer.Option(None, "--inertia-sigma", help="One sigma of the inertia, as a share; 0.01.")
+SPIN_SIGMA = typer.Option(None, "--spin-sigma", help="One sigma of a wheel's spin inertia, as a share; 0.0024.")
 JSON = typer.Option(False, "--json", help="One JSON object on standard output.")
 
 

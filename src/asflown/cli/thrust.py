@@ -12,11 +12,14 @@ from .options import (
     CRAFT,
     EXCLUDE,
     INERTIA,
+    INERTIA_SIGMA,
     JSON,
     KEEP_AS,
     KEEP_IN,
+    SPIN_SIGMA,
     START,
     STOP,
+    UNLIKE,
     check_picture,
     craft_from,
     hashes,
@@ -43,7 +46,11 @@ def thrust(
         None, "--cm-sigma", help='Sigma of the centre of mass, as in "0.1 0.1 0.5 m" (the default where it is given).'
     ),
     pulse_scatter: float = typer.Option(0.02, "--pulse-scatter", help="One sigma from pulse to pulse, as a share."),
+    unlike: float = UNLIKE,
+    spin_sigma: float = SPIN_SIGMA,
+    inertia_sigma: float = INERTIA_SIGMA,
     mass: str = typer.Option(None, "--mass", help='Mass of the craft, for the accelerometer, as in "3160 kg".'),
+    mass_sigma: float = typer.Option(None, "--mass-sigma", help="Its sigma, as a share; 0.001."),
     start: str = START,
     stop: str = STOP,
     channels: Path = CHANNELS,
@@ -69,14 +76,19 @@ def thrust(
         fall_sigma_s=quantity(fall_sigma, "s"),
         center_sigma_m=None if cm_sigma is None else numbers(cm_sigma, "m", 3),
         pulse_scatter=pulse_scatter,
+        unlike=unlike,
+        spin_share=spin_sigma,
+        inertia_share=inertia_sigma,
         mass_kg=None if mass is None else quantity(mass, "kg"),
+        mass_share=mass_sigma,
     )
     read = [telemetry_from(f, channels, exclude, start, stop, ship) for f in files]
     telemetry = [t for t, _ in read]
     inputs = {k: v for _, found in read for k, v in found.items()}
     result = thrust_of(telemetry, ship, method=method, variant=variant, priors=priors)
     options = {"craft": craft, "method": method, "variant": variant, "fall_time": fall_time, "fall_sigma": fall_sigma, "cm": cm,
-               "cm_sigma": cm_sigma, "pulse_scatter": pulse_scatter, "mass": mass, "start": start, "stop": stop,
+               "cm_sigma": cm_sigma, "pulse_scatter": pulse_scatter, "unlike": unlike, "spin_sigma": spin_sigma,
+               "inertia_sigma": inertia_sigma, "mass": mass, "mass_sigma": mass_sigma, "start": start, "stop": stop,
                "inertia": inertia}  # fmt: skip
     origin = provenance(inputs | hashes(craft), options)
     if store is not None:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:  # what the values are once loaded
     Kilogram = float
     Second = float
     Newton = float
+    Pascal = float
     Hertz = float
     KilogramMetre2 = float
     NewtonMetre = float
@@ -46,7 +47,7 @@ if TYPE_CHECKING:  # what the values are once loaded
     InertiaElements = tuple[float, float, float, float, float, float]
     InertiaRatio = tuple[float, float, float, float, float, float]
 else:  # how they are written
-    Kilogram, Second, Newton, Hertz = _in("kg"), _in("s"), _in("N"), _in("Hz")
+    Kilogram, Second, Newton, Hertz, Pascal = _in("kg"), _in("s"), _in("N"), _in("Hz"), _in("Pa")
     KilogramMetre2, NewtonMetre, NewtonMetreSecond = _in("kg m2"), _in("N m"), _in("N m s")
     Radian, RadianPerSecond, ViscousDrag = _in("rad"), _in("rad/s"), _in("N m s / rad")
     Metre, Metre2, MetrePerSecond = _in("m"), _in("m2"), _in("m/s")
@@ -188,6 +189,19 @@ class ThrustHistory(_Data):
     source: str = ""
 
 
+class BlowDown(_Data):
+    """A tank without a regulator: thrust goes as its pressure to a power."""
+
+    thrust: Newton = Field(gt=0)
+    pressure: Pascal = Field(gt=0)
+    exponent: float = Field(gt=0)
+    source: str = ""
+
+    def pressure_at(self, thrust_N: float) -> float:
+        """Of the tank where each thruster gives that thrust. [Pa]"""
+        return self.pressure * (thrust_N / self.thrust) ** (1 / self.exponent)
+
+
 class ThrusterController(_Data):
     """Thrusters fired outside a deadband of e + lead x rate error, a whole control cycle at a time."""
 
@@ -319,6 +333,7 @@ class Craft(_Data):
     wheel_controller: WheelController | None = None
     thrusters: tuple[Thruster, ...] = ()
     thrust_history: tuple[ThrustHistory, ...] = ()
+    blow_down: BlowDown | None = None
     thruster_controller: ThrusterController | None = None
     mechanisms: tuple[Mechanism, ...] = ()
     flexible_modes: tuple[FlexibleMode, ...] = ()

@@ -143,6 +143,9 @@ def velocity_chain(
         known=counters.at(at),
         used=np.ones(len(v) - 1, bool),
         step_s=step_s,
+        record=number,
+        long_of=counters.lengths.thruster,
+        weak=counters.weak(priors.pulse_scatter),
         sample_sigma=np.where(ticking, tick_sigma, scale / np.sqrt(12)),
         nuisances=(Nuisance(f"accelerometer bias of record {number}", np.diff(t)[:, None], _ANY_BIAS),),
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +13,7 @@ from ..kit.errors import BadInput, some_of
 from ..kit.timeline import NS
 from ..telemetry.telemetry import Channel, Telemetry
 from .pulse_counts import Guess, guess_pulses
+from .pulse_lengths import Lengths, lengths_of, weak_because_lasting
 from .subject import Subject
 
 #: After a pulse's order, what it gives is not all there for up to so long. [s]
@@ -24,10 +24,15 @@ _KNOWN = 0.25
 _ROUNDING = 1e-6
 
 
+class NothingFires(BadInput):
+    """No on-time rises."""
+
+
 class Known(NamedTuple):
     """What counters tell of N instants, (N, j) each.
 
-    ``squares``: of the pulses' lengths, added up [s2]: by them what scatters from pulse to pulse grows;
+    ``squares``: of the pulses' lengths, added up [s2]: by them what scatters from pulse to pulse grows; ``short``: of those
+    alone that are not followed one by one, and ``long`` (N, L) the on-time so far of each that is;
     ``early``: variance of the number of pulses given by then; ``duty`` and ``rate``: share of time on, and pulses a second, of
     the interval that ends there: of what they gave some may still be to come."""
 
@@ -36,6 +41,8 @@ class Known(NamedTuple):
     spread: np.ndarray
     chance: np.ndarray
     squares: np.ndarray
+    short: np.ndarray
+    long: np.ndarray
     early: np.ndarray
     duty: np.ndarray
     rate: np.ndarray
@@ -59,29 +66,21 @@ class Counters:
     counted: bool  # pulses are telemetry, not a guess
 
     @cached_property
-    def squares(self) -> np.ndarray:
-        """Squares of the pulses' lengths added up, (M, j). [s2]
+    def lengths(self) -> Lengths:
+        return lengths_of(self.on_time_s, self.pulses)
 
-        Pulses that begin in one interval are alike in it; the last of them goes on through intervals in which none begins."""
-        steps, begun = np.diff(self.on_time_s, axis=0), np.diff(self.pulses, axis=0)
-        added = np.zeros_like(steps)
-        for j, (T, n) in enumerate(zip(steps.T, begun.T, strict=True)):
-            starts = np.flatnonzero((T > 0) & ((n >= 0.5) | np.r_[True, T[:-1] <= 0]))
-            for a, b in pairwise([*starts, len(T)]):
-                count = max(n[a], 1.0)
-                own = T[a] / count
-                last = own + T[a + 1 : b].sum()
-                added[a, j] = (count - 1) * own**2 + own * last
-                added[a + 1 : b, j] = T[a + 1 : b] * last
-        return np.vstack([np.zeros(steps.shape[1]), np.cumsum(added, axis=0)])
+    def weak(self, scatter: float) -> np.ndarray:
+        """Share by which what each thruster gave may lie below the mean of its pulses, (j,)."""
+        return weak_because_lasting(np.diff(self.on_time_s, axis=0), np.diff(self.tai_ns) / NS, scatter)
 
     def at(self, tai_ns) -> Known:
         """At instants within the counters' span: between two samples all is in proportion to time."""
         x, grid = (np.asarray(v - self.tai_ns[0], float) / NS for v in (tai_ns, self.tai_ns))
         k = np.clip(np.searchsorted(grid, x, side="right") - 1, 0, len(grid) - 2)
         f = ((x - grid[k]) / (grid[k + 1] - grid[k]))[:, None]
-        sums = (self.on_time_s, self.pulses, self.spread, self.chance, self.squares, self.loose)
-        on, n, s, chance, squares, loose = ((1 - f) * v[k] + f * v[k + 1] for v in sums)
+        own = self.lengths
+        sums = (self.on_time_s, self.pulses, self.spread, self.chance, own.squares, own.short, own.long, self.loose)
+        on, n, s, chance, squares, short, long, loose = ((1 - f) * v[k] + f * v[k + 1] for v in sums)
         # counters finer than a tail lasts: the pulses of the last tail are what may not be there yet
         before = np.minimum(np.where(f[:, 0] > 0, grid[k], grid[np.maximum(k - 1, 0)]), x - _TAIL_S)
         span = np.maximum(x - before, _TAIL_S)[:, None]
@@ -97,6 +96,8 @@ class Counters:
             s,
             chance,
             squares,
+            short,
+            long,
             (self.pulses[k + 1] - self.pulses[k]) * f * (1 - f) + loose,
             lately(self.on_time_s),
             lately(self.pulses),
@@ -132,7 +133,7 @@ def counters_of(subject: Subject) -> tuple[tuple[Thruster, ...], Counters, list[
     on, loose = values[:, : len(names)], loose[:, : len(names)]
     steps, broken = _risen(np.diff(on, axis=0), "on-time", names, tlm, tai_ns, doubts)
     if not (steps > 0).any():
-        raise BadInput(
+        raise NothingFires(
             "no thruster fires in this record",
             file=tlm.source or None,
             remedy="Take a record of a wheel biasing, a run-down under thruster control or a burn.",

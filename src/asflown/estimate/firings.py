@@ -13,16 +13,17 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..craft.model import Craft, Thruster
-from ..kit.errors import BadInput, some_of
+from ..kit.errors import BadInput
 from ..kit.rotations import turned_by
 from ..kit.timeline import NS
 from ..telemetry.telemetry import Telemetry
-from .counters import Counters, Known, counters_of, step_of
+from .counters import Counters, Known, NothingFires, counters_of, step_of
 from .external_samples import Samples, samples_of
 from .subject import Subject, subject_of
+from .thruster_branch import CHANNEL, branch_change, branches_in_use, undescribed
+from .uncounted import PULSES, gained_idle, pulse_Nms, uncounted
+from .wheel_limits import at_limit
 
-#: Share of a wheel's rate limit at which its motor, and perhaps its telemetry, saturates.
-_SATURATED = 0.995
 #: Pulses a second times this is what a sample soon after some of them counts as not known. [s]
 _TAIL_S = 0.2
 #: While something fires, samples further apart than this are enough: the quietest of each such span is taken. [s]
@@ -47,7 +48,8 @@ class Firings:
     rates: np.ndarray | None
     by_quaternion: bool
     known: Known
-    broken: np.ndarray  # (N - 1,) bool
+    broken: np.ndarray  # (N - 1,) bool: what was fired, or what was gained, is not known
+    at_limit: np.ndarray  # (N,) bool: a wheel may be at its rate limit
     counters: Counters
     doubts: tuple[str, ...]
 
@@ -95,7 +97,10 @@ def firings_of(telemetry: Telemetry, craft: Craft, enough_s: float = _ENOUGH_S) 
             remedy="Give spin_inertia in the craft file.",
         )
     subject.known_inertia()
-    thrusters, counters, doubts = counters_of(subject)
+    try:
+        thrusters, counters, doubts = counters_of(subject)
+    except NothingFires as why:
+        raise _idle(subject, why) from None
     samples = samples_of(subject)
     chosen = _instants(samples, counters, enough_s)
     if len(chosen) < 3:
@@ -109,6 +114,15 @@ def firings_of(telemetry: Telemetry, craft: Craft, enough_s: float = _ENOUGH_S) 
     broken = np.zeros(len(tai_ns) - 1, bool)
     for k in np.flatnonzero(counters.broken):
         broken |= (tai_ns[:-1] < counters.tai_ns[k + 1]) & (tai_ns[1:] > counters.tai_ns[k])
+    limited, of_wheels = at_limit(subject, tai_ns)
+    broken |= limited[1:] | limited[:-1]
+    if broken.all():
+        raise BadInput(
+            "no two neighbouring instants have momentum and on-times that are known: "
+            + "; ".join([*of_wheels, *doubts]),
+            file=telemetry.source or None,
+            remedy="Take a record, or a span of it, in which counters and wheels stay within their ranges.",
+        )
     return Firings(
         subject=subject,
         thrusters=thrusters,
@@ -121,8 +135,9 @@ def firings_of(telemetry: Telemetry, craft: Craft, enough_s: float = _ENOUGH_S) 
         by_quaternion=samples.attitude is not None,
         known=_smeared(counters.at(tai_ns), samples.splined_s),
         broken=broken,
+        at_limit=limited,
         counters=counters,
-        doubts=(*subject.doubts, *samples.doubts, *doubts, *_saturated(subject), *_branch(subject, thrusters)),
+        doubts=(*subject.doubts, *samples.doubts, *doubts, *of_wheels, *_one_branch(telemetry, thrusters)),
     )
 
 
@@ -157,34 +172,28 @@ def _turned(s: Samples) -> Rotation:
     return Rotation.identity(len(s.tai_ns)) if s.rates is None else turned_by(s.seconds, s.rates)
 
 
-def _saturated(subject: Subject) -> list[str]:
-    out = []
-    for c, wheel in subject.wheels() if subject.telemetry.members("wheel_rate") else ():
-        rates = np.abs(c.usable.values)
-        if wheel.rate_limit is not None and len(rates) and rates.max() > _SATURATED * wheel.rate_limit:
-            out.append(
-                f"wheel {wheel.name} runs at its rate limit: where its reading stops there, momentum is missing. Narrow the span"
-            )
-    return out
+def _idle(subject: Subject, why: NothingFires) -> BadInput:
+    """No on-time rises: whether the momentum says otherwise."""
+    samples = samples_of(subject)
+    if samples.rates is None:
+        return why
+    craft, turned = subject.craft.craft, _turned(samples)
+    step_s = craft.wheel_controller.period if craft.wheel_controller else 0.125
+    gained = gained_idle(turned.apply(samples.momentum), turned.apply(samples.body))
+    pulses = gained / pulse_Nms(craft, craft.thrusters, step_s, int(samples.tai_ns[0]))
+    return uncounted(gained, pulses, "in this record", subject.telemetry.source) if pulses > PULSES else why
 
 
-def _branch(subject: Subject, thrusters) -> list[str]:
+def _one_branch(tlm: Telemetry, thrusters) -> list[str]:
     """Doubts about the branch in use; raises BadInput where it changes."""
-    tlm = subject.telemetry
-    if "thruster_branch" not in tlm:
-        return []
-    used = sorted({str(v) for v in tlm.channel("thruster_branch").usable.values})
-    if len(used) > 1:
+    if (change := branch_change(tlm)) is not None:
         raise BadInput(
-            f"the thrusters' branch changes in this record ({some_of(used)}), and each branch has a thrust of its own",
+            f"the thrusters' branch changes in this record ({change}), and each branch has a thrust of its own",
             file=tlm.source or None,
-            channel="thruster_branch",
+            channel=CHANNEL,
             remedy="Give one record a branch: cut it with --start and --stop.",
         )
-    described = sorted({t.branch for t in thrusters if t.branch})
-    if described and used and used != described:
-        return [
-            f"branch {used[0]} is in use and the craft file describes branch {some_of(described)}: its places and directions are "
-            f"taken, and the thrust is that of branch {used[0]}"
-        ]
-    return []
+    other = undescribed(tlm, thrusters)
+    if other is None:
+        return []
+    return [f"{other}: its places and directions are taken, and the thrust is that of branch {branches_in_use(tlm)[0]}"]

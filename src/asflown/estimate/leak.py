@@ -9,7 +9,7 @@ A ``LeakWatch`` takes telemetry as it grows and gives in pieces what one look at
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,14 +17,19 @@ from scipy.stats import norm
 
 from ..craft.model import Craft
 from ..kit.errors import BadInput, some_of
-from ..kit.timeline import NS, utc_label
+from ..kit.timeline import NS
 from ..telemetry.telemetry import Telemetry
+from .leak_doubts import branch_doubts, loss_doubt, noise_doubts, pointing_doubt, thrust_doubts, together
 from .leak_error_monitor import ErrorMonitor, error_monitor, threshold_at_rate
-from .leak_filter import Evidence, Known, Monitor, threshold_for
+from .leak_filter import Evidence, Monitor, threshold_for
 from .leak_firing import geometry_of
+from .leak_known import Known
 from .leak_result import LeakResult
-from .leak_samples import AXES_IN_A_LEAK, Noise, Steps, learned_noise, steps_of
+from .leak_samples import Noise, Steps, learned_noise, steps_of
 from .subject import Subject, subject_of
+from .thruster_branch import other_branch
+from .uncounted import PULSES, gained_idle, pulse_Nms, uncounted
+from .wheel_limits import stopped
 
 METHODS = ("likelihood", "threshold")
 
@@ -34,11 +39,7 @@ POWER = 0.9  # of the smallest detectable leak
 
 #: Instants that a stream keeps back: a spike is one only once its neighbours are there.
 _HELD_BACK = 3
-_FAR_FROM_KNOWN = 200 * 86_400 * NS  # a thrust from longer ago is doubted
 _SURE = 0.95  # posterior below which the thruster named is doubted
-_MISFIT = 7.0  # log likelihood ratio of any direction over the best column; noise exceeds it once in 1100
-_FEW_DEGREES = 120
-_FOLLOWING = 3.0  # readings worth one, beyond which a doubt says so
 
 
 def leak(telemetry: Telemetry, craft: Craft, **options) -> LeakResult:
@@ -104,6 +105,9 @@ class LeakWatch:
         thrust = self._thrust_N or self._believed_thrust(telemetry.epoch_ns)
         try:
             steps = steps_of(subject, self.geometry, thrust)
+        except BadInput as why:
+            raise why.within(telemetry.source) from why.__cause__
+        try:
             if not final:
                 steps = steps.first(len(steps.tai_ns) - _HELD_BACK)
             if self._monitor is not None and not self._follows(steps):
@@ -111,6 +115,12 @@ class LeakWatch:
             if self._noise is None:
                 self._noise = learned_noise(steps, final)
         except BadInput as why:
+            if final and steps.body_rate.any() and not steps.ordered.any():
+                body = np.einsum("nij,nj->ni", steps.turned, steps.body_rate @ subject.known_inertia())
+                gained = gained_idle(steps.residual, body)
+                pulses = gained / self._pulse_Nms(telemetry.epoch_ns)
+                if pulses > PULSES:
+                    raise uncounted(gained, pulses, "in this record", telemetry.source) from why
             raise why.within(telemetry.source) from why.__cause__
         self._view = _View(subject, steps, thrust)
         if self._noise is None:
@@ -135,20 +145,28 @@ class LeakWatch:
         at_window = windows.get(self.window_s)
         found: dict[str, Any] = dict.fromkeys(
             ("kind", "thruster", "posterior", "onset_s", "onset_95_s", "torque_Nm", "torque_sigma_Nm", "leak_N",
-             "leak_sigma_N", "loss", "loss_sigma")
+             "leak_sigma_N", "loss", "loss_sigma", "together")
         )  # fmt: skip
-        doubts = [*view.subject.doubts, *steps.doubts, *self._about(view)]
+        doubts = [*view.subject.doubts, *steps.doubts, *noise_doubts(self._noise, steps)]
+        if self._thrust_N is None and steps.ordered.any():
+            doubts += thrust_doubts(tlm.epoch_ns, self.craft)
         if at_window is None:
             doubts.append(
                 f"up to its end or its alarm the record is shorter than {self.window_s:g} s: the smallest leak found by then is not given"
             )
+        if alarm is not None:
+            doubts = [
+                *branch_doubts(tlm, self.craft),
+                *stopped(view.subject),
+                *doubts,
+            ]  # what may be wrong with it comes first
         if alarm is not None and self.method == "threshold":
             found |= {"kind": "leak", "thruster": papers.thruster}
             doubts.append("the papers' monitor gives no probability, and takes any momentum not ordered for a leak")
         elif alarm is not None and monitor.best is not None:
-            told, more = self._told(monitor.best, t, view.thrust_N)
+            told, more = self._told(monitor.best, t, view.thrust_N, tlm.epoch_ns)
             found |= told
-            doubts += more
+            doubts = [*more, *doubts]
         return LeakResult(
             craft=self.craft.name,
             epoch=tlm.epoch_label,
@@ -169,11 +187,12 @@ class LeakWatch:
             noise_Nms=self._noise.sigma,
             monitor=papers,
             doubts=tuple(dict.fromkeys(doubts)),
+            taken_as_known=str(self.known),
             settings={
                 "thrust_N": view.thrust_N,
                 "center_of_mass_m": self.craft.center_of_mass,
                 "inertia_kg_m2": view.subject.inertia_kgm2,
-                "one_sigma_of_what_is_known": asdict(self.known),
+                "one_sigma_of_what_is_known": self.known.record(),
             },
         )
 
@@ -226,7 +245,7 @@ class LeakWatch:
             if age[0] <= w <= age[-1]
         }
 
-    def _told(self, e: Evidence, t, thrust_N: float) -> tuple[dict, list[str]]:
+    def _told(self, e: Evidence, t, thrust_N: float, epoch_ns: int) -> tuple[dict, list[str]]:
         """What the evidence says of the change, and doubts."""
         weights, names = e.weights(thrust_N), self.geometry.names
         j, by_hypothesis = len(names), weights.sum(axis=0)
@@ -246,18 +265,19 @@ class LeakWatch:
             "posterior": dict(zip(names, posterior.tolist(), strict=True)),
             "onset_s": float(since[b]), "onset_95_s": (float(since[low]), float(t[e.onset[min(high, len(since) - 1)]])),
         }  # fmt: skip
-        doubts = []
+        better = 0.5 * float(e.free_d[b] @ free) - 0.5 * float(e.d[b, h] ** 2 / e.c[b, h])
+        gained = float(np.linalg.norm(free)) * (t[e.instant] - since[b])
+        one = self._pulse_Nms(epoch_ns)
+        mixed = together(better, free, C, self.geometry)
+        doubts = [pointing_doubt(better, mixed, gained / one)]
+        if len(mixed) > 1:
+            found["together"] = mixed
         if weak:
             found |= {"loss": size, "loss_sigma": sigma}
+            doubts.append(loss_doubt(size, sigma))
         else:
             found |= {"leak_N": size, "leak_sigma_N": sigma, "torque_Nm": free,
                       "torque_sigma_Nm": np.sqrt(np.diag(np.linalg.inv(C)))}  # fmt: skip
-            better = 0.5 * float(e.free_d[b] @ free) - 0.5 * float(e.d[b, h] ** 2 / e.c[b, h])
-            if better > _MISFIT:
-                doubts.append(
-                    f"the torque does not point as any thruster's would (log likelihood ratio {better:.1f}): something else may turn "
-                    "the craft, or centre of mass or inertia are not right"
-                )
             if np.linalg.norm(free) < 5 * self.known.torque_Nm:
                 doubts.append(
                     "a torque so small may come from outside too (sunlight, thin atmosphere) and have changed"
@@ -271,39 +291,11 @@ class LeakWatch:
             doubts.append(
                 "it is there from the record's beginning: only its size tells it from the steady torque from outside"
             )
-        return found, doubts
+        return found, [d for d in doubts if d]
+
+    def _pulse_Nms(self, epoch_ns: int) -> float:
+        return pulse_Nms(self.craft, self.craft.thrusters, self.geometry.shortest_s, epoch_ns)
 
     def _alternative(self, thruster: str | None) -> str | None:
         """The thruster of the other branch sits beside this one, and momentum cannot tell them apart."""
-        if thruster is None:
-            return None
-        branch = self.geometry.branches[self.geometry.names.index(thruster)]
-        other = {"A": "B", "B": "A"}.get(branch)
-        return f"{thruster} of branch {other}" if other else None
-
-    def _about(self, view: _View) -> list[str]:
-        doubts, noise, tlm = [], self._noise, view.subject.telemetry
-        assert noise is not None
-        if noise.degrees < _FEW_DEGREES:
-            doubts.append(
-                f"the noise is learned from readings worth {noise.degrees / AXES_IN_A_LEAK:.0f} independent ones: a larger leak is needed for an alarm"
-            )
-        if noise.alike.max() > _FOLLOWING:
-            doubts.append(
-                f"readings in the holds the noise is learned from follow each other ({noise.alike.max():.0f} are worth one): if something "
-                "moved then, the noise is overstated and small leaks stay hidden"
-            )
-        fires = (view.steps.ordered > 0).any()
-        known = [h.date for h in self.craft.thrust_history]
-        nearest = min(known, key=lambda d: abs(tlm.epoch_ns - d), default=None)
-        if fires and self._thrust_N is None and (nearest is None or abs(tlm.epoch_ns - nearest) > _FAR_FROM_KNOWN):
-            doubts.append(
-                "the thrust is the nominal one: --thrust says it better"
-                if nearest is None
-                else f"the thrust is carried over from {utc_label(nearest)[:10]}, the nearest date known: --thrust says it better"
-            )
-        if not len(view.steps.tai_ns[noise.until :]):
-            doubts.append(
-                "the noise is learned from all of the record: a leak through all of it would count as steady torque"
-            )
-        return doubts
+        return None if thruster is None else other_branch(thruster, self.craft.thrusters)

@@ -21,25 +21,12 @@ from scipy.special import log_ndtr
 
 from ..kit.errors import BadInput
 from .leak_firing import Geometry
+from .leak_known import Known
 from .leak_samples import AXES_IN_A_LEAK, Noise, Steps
 
 #: Times at which a change may have begun are kept this many to an octave of age, and half as many again.
 _PER_OCTAVE = 8
 _UNKNOWN = 1e3  # sigma of momentum where nothing is known of it, in sigmas of a reading
-
-
-@dataclass(frozen=True)
-class Known:
-    """One sigma of what is taken as known; all assumed."""
-
-    thrust_share: float = 0.10  # of all thrusters together: blow-down, and fall time (13 of 170 ms a pulse)
-    each_share: float = 0.03  # of one against the others
-    pulse_share: float = 0.03  # of one pulse against another (001: 1 to 3 %)
-    center_of_mass_m: float = 0.02
-    inertia_share: float = 0.01  # 001 Table 1
-    spin_share: float = 0.0024  # 001: 0.161 for 0.16138
-    torque_Nm: float = 3e-6  # from outside, steady; 001 Table A1: 2.11 uN m
-    torque_walk_Nm_per_sqrt_s: float = 1e-6 / 60  # 1 uN m in an hour
 
 
 #: Law of false alarms, ln(rate an instant) = OFFSET + POWER ln h - h for a threshold h: studies/leak_threshold.py.
@@ -127,7 +114,7 @@ class Monitor:
         moment = known.inertia_share * np.r_[np.diag(inertia_kgm2), np.full(3, np.trace(inertia_kgm2) / 3)]
         self.x = np.zeros(at[-1])
         sigma = np.r_[np.full(3, unknown), np.full(3, known.torque_Nm), np.full(j, known.each_share), np.full(j, known.pulse_share),
-                      np.full(3, known.center_of_mass_m), moment, np.full(wheels, known.spin_share)]  # fmt: skip
+                      known.center_of_mass_m, moment, np.full(wheels, known.spin_share)]  # fmt: skip
         self.P = np.diag(sigma**2)
         self.P[self._thrust, self._thrust] += known.thrust_share**2
         self.onset = np.zeros(0, int)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..kit.errors import some_of
 from .leak_error_monitor import ErrorMonitor
 from .wheel_result import plus_minus
 
@@ -49,7 +50,9 @@ class LeakResult:
     noise_Nms: np.ndarray
     monitor: ErrorMonitor
     doubts: tuple[str, ...] = ()
+    together: list[str] | None = None  # thrusters that make it between them, where no one alone would
     settings: dict = field(default_factory=dict)
+    taken_as_known: str = ""
 
     def record(self) -> dict:
         """The JSON form, without command and provenance."""
@@ -57,7 +60,7 @@ class LeakResult:
         return {
             "craft": self.craft, "epoch": self.epoch, "method": self.method,
             "alarm": self.alarm, "alarm_s": self.alarm_s, "kind": self.kind,
-            "thruster": self.thruster, "alternative": self.alternative, "posterior": self.posterior,
+            "thruster": self.thruster, "alternative": self.alternative, "together": self.together, "posterior": self.posterior,
             "onset_s": self.onset_s, "onset_95_s": self.onset_95_s,
             "torque_Nm": self.torque_Nm, "torque_sigma_Nm": self.torque_sigma_Nm,
             "leak_N": self.leak_N, "leak_sigma_N": self.leak_sigma_N,
@@ -99,6 +102,7 @@ class LeakResult:
             )
             lines.append(f"    [µN m]  {by_window}")
         lines.append(f"  {self._monitor_text()}")
+        lines.append(f"  taken as known: {self.taken_as_known}")
         return "\n".join(lines)
 
     def _verdict(self) -> list[str]:
@@ -109,6 +113,11 @@ class LeakResult:
             return [f"  ALARM  at {self.alarm_s:.0f} s: residual momentum {self.monitor.signs}: {named}{self._or()}"]
         what = "leaks" if self.kind == "leak" else "is weak"
         lines = [f"  ALARM  at {self.alarm_s:.0f} s: {self.thruster} {what}{self._or()}"]
+        if self.together:
+            lines = [
+                f"  ALARM  at {self.alarm_s:.0f} s: momentum as of several thrusters, {some_of(self.together)}; of one alone, {self.thruster} "
+                f"{what}{self._or()}"
+            ]
         if self.kind == "leak" and self.torque_Nm is not None and self.torque_sigma_Nm is not None:
             torque = ", ".join(
                 plus_minus(1e3 * v, 1e3 * s) for v, s in zip(self.torque_Nm, self.torque_sigma_Nm, strict=True)

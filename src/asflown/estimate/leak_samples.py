@@ -20,6 +20,7 @@ from ..kit.timeline import NS, runs
 from .external_samples import Samples, samples_of
 from .leak_firing import Geometry, firing_of
 from .subject import Subject
+from .wheel_limits import at_limit
 
 #: Noise is learned from quiet pieces of so many instants, from the first ones of which so many count together.
 _PIECE, _SHORTEST, _ENOUGH, _FEWEST = 40, 8, 150, 12
@@ -44,7 +45,7 @@ class Steps:
     pulses: np.ndarray  # (N, j), how many those were
     guessed: np.ndarray  # (N, j), relative variance of ``ordered`` where pulses are not counted
     unsure: np.ndarray  # (N, 3, 3), variance of y that firing adds, body axes
-    lost: np.ndarray  # (N,), what was ordered since the last instant is not known
+    lost: np.ndarray  # (N,), what was ordered or gained since the last instant is not known
     doubts: tuple[str, ...]
 
     @property
@@ -78,6 +79,7 @@ def steps_of(subject: Subject, geometry: Geometry, thrust_N: float) -> Steps:
     step, begun = (np.diff(v, axis=0, prepend=v[:1]) for v in (given, pulses))
     middle = _halfway(turned[kept])
     taken = np.cumsum(np.einsum("nij,nj->ni", middle, step @ geometry.columns.T), axis=0)
+    limited, of_wheels = at_limit(subject, s.tai_ns[kept])
     axes = np.array([w.axis for w in subject.craft.wheels])
     share = s.stored[kept] @ np.linalg.pinv(axes)  # exact for three wheels; of four, the nearest split
     return Steps(
@@ -90,8 +92,8 @@ def steps_of(subject: Subject, geometry: Geometry, thrust_N: float) -> Steps:
         pulses=begun,
         guessed=_guessed(begun * ~fired.counted, step, geometry, thrust_N),
         unsure=unsure,
-        lost=np.diff(lost, prepend=lost[:1]) > 0,
-        doubts=(*s.doubts, *fired.doubts),
+        lost=(np.diff(lost, prepend=lost[:1]) > 0) | limited | np.r_[False, limited[:-1]],
+        doubts=(*s.doubts, *fired.doubts, *of_wheels),
     )
 
 

@@ -18,20 +18,24 @@ from ..kit.errors import BadInput, some_of
 from ..kit.timeline import NS, utc_label
 from ..telemetry.telemetry import Telemetry
 from .accelerometer import CHANNEL, velocity_chain
-from .firings import firings_of
+from .firings import Firings, firings_of
 from .thrust_chains import momentum_chain
-from .thrust_evidence import check_names, common_of, doubts_of, event_seen, valve_of
+from .thrust_contradictions import check_counted, check_names
+from .thrust_evidence import common_of, doubts_of, event_seen, valve_of
 from .thrust_fit import Fit, fit_thrust
 from .thrust_papers import accelerometer_result, printed_result
 from .thrust_priors import Priors, priors_for
 from .thrust_result import ThrustResult
+from .wheel_limits import stopped
 
 METHODS = ("joint", "printed", "accelerometer")
 
 #: Records this far apart may have different thrusts. [days]
 _APART_DAYS = 60.0
-#: A prediction older than this is doubted. [days]
-_STALE_DAYS = 200.0
+#: A prediction older than this is doubted [days]; a newer one is taken to be good to this share, assumed.
+_STALE_DAYS, _PREDICTED_SHARE = 200.0, 0.05
+#: Two branches' thrusts are not further apart than this share; assumed.
+_NO_BRANCH = 0.3
 #: Correlation beyond which thrust and fall time are not told apart, and share of a prior's sigma that data must beat.
 _TIED, _UNTOLD = 0.95, 0.8
 #: Share of the sigma of a thrust over the mean that is the centre of mass's, beyond which the two are not told apart.
@@ -81,6 +85,16 @@ def thrust(
             doubts.append(
                 f"the predicted thrust is that of {utc_label(last)[:10]}, the last one known: it has fallen since"
             )
+        elif done.mean_sigma_N is not None:
+            off, expected = done.mean_thrust_N - predicted, np.hypot(done.mean_sigma_N, _PREDICTED_SHARE * predicted)
+            if abs(off) > 2 * expected:
+                why = "the other branch, with a thrust of its own and the same places, would look so"
+                if abs(off) > _NO_BRANCH * predicted:
+                    why = "neither blow-down nor the other branch explains so much"
+                doubts.append(
+                    f"the mean is {100 * off / predicted:+.0f} % from the {predicted:.3g} N predicted, which are taken to be known to "
+                    f"{100 * _PREDICTED_SHARE:.0f} %: {why}"
+                )
     return replace(done, predicted_N=predicted, doubts=tuple(dict.fromkeys(doubts)))
 
 
@@ -95,6 +109,7 @@ def _joint(telemetry: list[Telemetry], craft: Craft, _: str, priors: Priors) -> 
                 channel="body_rate_x",
                 remedy="Add body_rate_x, _y and _z, or use --method printed.",
             )
+        check_counted(f, craft)
         check_names(f, priors)
         records.append(f)
         chains.append(momentum_chain(f, priors, number))
@@ -111,7 +126,7 @@ def _joint(telemetry: list[Telemetry], craft: Craft, _: str, priors: Priors) -> 
     left = [r for c, r in zip(chains, fit.left, strict=True) if c.turn is not None]
     weights = fit.mean_weights
     parts = {"fall time": ("fall",), "spin inertia": ("spin inertia",), "inertia": ("inertia",), "centre of mass": ("center",),
-             "mass": ("mass",), "pulses not counted": ("pulses not",)}  # fmt: skip
+             "mass": ("mass",), "pulses not counted": ("pulses not",), "pulses of minutes": ("pulse ",), "pulses that last": ("lasting",)}  # fmt: skip
     shares = {label: fit.share(weights, *keys) for label, keys in parts.items()}
     mean, mean_sigma = fit.mean()
     value = {n: fit.value(f"thrust {n}") if n in fit.fired else None for n in names}
@@ -135,13 +150,13 @@ def _joint(telemetry: list[Telemetry], craft: Craft, _: str, priors: Priors) -> 
         misfit=fit.misfit,
         priors=priors.record(),
         priors_told=str(priors),
-        doubts=(*doubts_of(records), *doubts, *_joint_doubts(fit, priors, chains)),
+        doubts=(*doubts_of(records), *doubts, *_joint_doubts(fit, priors, records)),
         events=tuple(event_seen(f, r, k) for k, (f, r) in enumerate(zip(records, left, strict=True), 1)),
         **common_of(records, craft, telemetry[0], valve),
     )
 
 
-def _joint_doubts(fit: Fit, priors: Priors, chains) -> list[str]:
+def _joint_doubts(fit: Fit, priors: Priors, records: list[Firings]) -> list[str]:
     doubts = []
     mean, sigma = fit.mean()
     if sigma > _HARDLY * abs(mean):
@@ -174,6 +189,7 @@ def _joint_doubts(fit: Fit, priors: Priors, chains) -> list[str]:
             f"what the fit leaves is {np.sqrt(fit.misfit):.1f} times the noise taken for it, and sigmas are widened so: booms or propellant "
             "that swing, a leak, or thrusters unlike the model"
         )
+        doubts += [d for f in records for d in stopped(f.subject)]
     return doubts
 
 

@@ -47,6 +47,9 @@ class Chain:
     known: Known  # at the samples, (K + 1, j) each
     used: np.ndarray  # (K,) bool
     step_s: float
+    record: int  # its pulses are those of all chains of that record
+    long_of: np.ndarray  # (L,): thrusters of pulses followed one by one
+    weak: np.ndarray  # (j,): share by which what was given may lie below the mean of its pulses
     sample_sigma: np.ndarray | None = None  # (K + 1,): noise of each sample where it is known
     nuisances: tuple[Nuisance, ...] = field(default=())
 
@@ -62,6 +65,12 @@ class Chain:
     @property
     def pulses(self) -> np.ndarray:
         return np.maximum(np.diff(self.known.pulses, axis=0), 0.0)
+
+    @property
+    def long(self) -> dict[str, tuple[int, np.ndarray]]:
+        """Pulses of many steps, each with a thrust of its own: thruster, and on-time in every step (K,)."""
+        steps = np.diff(self.known.long, axis=0)
+        return {f"pulse {k} of record {self.record}": (int(j), steps[:, k]) for k, j in enumerate(self.long_of)}
 
     @property
     def spread(self) -> np.ndarray:
@@ -123,7 +132,7 @@ class Chain:
         push = self.arms(center) * thrust_N  # (K, d, j)
         on = self.on_time_s
         longer = np.where(on > 0, self.effective(valve) / np.where(on > 0, on, 1.0), 0.0)  # R of each step
-        squares = np.maximum(np.diff(self.known.squares, axis=0), 0.0) * longer**2
+        squares = np.maximum(np.diff(self.known.short, axis=0), 0.0) * longer**2
         walk = pulse_scatter**2 * np.einsum("kdj,kej,kj->kde", push, push, squares)
         guessed = push * valve.added() * np.sqrt(np.maximum(np.diff(self.known.chance, axis=0), 0.0))[:, None, :]
         walk += guessed @ self.together() @ np.swapaxes(guessed, 1, 2)
@@ -200,4 +209,7 @@ def momentum_chain(f: Firings, priors, number: int) -> Chain:
         used=~f.broken,
         step_s=f.step_s,
         nuisances=tuple(nuisances),
+        record=number,
+        long_of=f.counters.lengths.thruster,
+        weak=f.counters.weak(priors.pulse_scatter),
     )

@@ -1,25 +1,16 @@
-"""What the results of all methods share: on-times, pulses and R, what a record showed, and whether names and momentum agree."""
+"""What the results of all methods share: on-times, pulses and R, and what a record showed."""
 
 from __future__ import annotations
-
-from itertools import combinations
 
 import numpy as np
 
 from ..craft.model import Craft, Thruster
-from ..dynamics.pulses import Valve, expected_effective, moment_matrix
-from ..kit.errors import BadInput
+from ..dynamics.pulses import Valve, expected_effective
 from ..kit.timeline import utc_label
 from ..telemetry.telemetry import Telemetry, file_name
 from .counters import Counters
 from .firings import Firings
-from .thrust_printed import balance
-from .thrust_priors import Priors
 from .thrust_result import EventSeen
-
-#: Share of the momentum gained that one thrust for all leaves unexplained: above it names, places or units are wrong; and to
-#: which share of that an exchange of two names must bring it to be told.
-_UNEXPLAINED, _BETTER = 0.5, 0.3
 
 
 def valve_of(thrusters: tuple[Thruster, ...], fall_s: float) -> Valve:
@@ -54,36 +45,6 @@ def doubts_of(records: list[Firings]) -> list[str]:
     if len(records) == 1:
         return list(records[0].doubts)
     return [f"{f.telemetry.source or f'record {k}'}: {d}" for k, f in enumerate(records, 1) for d in f.doubts]
-
-
-def check_names(f: Firings, priors: Priors) -> None:
-    """Raises BadInput where the momentum contradicts the thrusters named, and exchanging two of them would mend it."""
-    center = f.subject.craft.craft.center_of_mass or priors.center_m
-    Q = moment_matrix([t.position for t in f.thrusters], [t.direction for t in f.thrusters], center)
-    V, on = balance(f), f.known.on_time_s[1:] - f.known.on_time_s[0]
-
-    def unexplained(order) -> float:
-        u, v = (on[:, order] @ Q.T).ravel(), V.ravel()
-        F = max(float(u @ v) / max(float(u @ u), 1e-300), 0.0)
-        return float(np.linalg.norm(v - F * u)) / max(float(np.linalg.norm(v)), 1e-300)
-
-    order = np.arange(len(Q.T))
-    own = unexplained(order)
-    if own < _UNEXPLAINED:
-        return
-    tried = []
-    for a, b in combinations(order, 2):
-        swapped = order.copy()
-        swapped[[a, b]] = swapped[[b, a]]
-        tried.append((unexplained(swapped), f.names[a], f.names[b]))
-    best, one, other = min(tried)
-    if best < _BETTER * own:
-        raise BadInput(
-            f"momentum and firings contradict each other ({100 * own:.0f} % unexplained); with {one} and {other} exchanged {100 * best:.0f} % are",
-            file=f.telemetry.source or None,
-            channel=f"on_time_{one}",
-            remedy="Name the on-time columns rightly, or correct the thrusters in the craft file.",
-        )
 
 
 def event_seen(f: Firings, left, number: int) -> EventSeen:

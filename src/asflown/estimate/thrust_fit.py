@@ -22,6 +22,10 @@ _UNLIKE = np.geomspace(0.002, 0.3, 11)
 #: Flat prior on the thrusters' mean: its sigma. [N]
 _ANY_THRUST = 1e4
 _ROUNDS = 12
+#: What lasts of a burn is weak by a share that is known (Chain.weak) times something between none and all: its sigma and mean.
+_LASTING, _HALF = "lasting", 0.5
+#: Scatter from pulse to pulse below which it is none: the least that a pulse followed by itself is given.
+_SCATTER = 1e-6
 #: Chance below which what is left over is more than the noise taken for it.
 _CHANCE = 0.01
 
@@ -162,6 +166,9 @@ class _Model:
             f"pulses not counted, {c.what}, {k}": (c, g) for c in chains for k, g in enumerate(c.guessed())
         }
         own |= dict.fromkeys(self.uncounted, 1.0)
+        own |= {n: max(priors.pulse_scatter, _SCATTER) for c in chains for n in c.long}
+        if any(c.weak.any() for c in chains):
+            own[_LASTING] = _HALF
         self.names = [f"thrust {names[k]}" for k in fired] + [
             "mean thrust",
             "fall",
@@ -175,6 +182,8 @@ class _Model:
     def start(self) -> np.ndarray:
         """One thrust for all, by least squares with everything else as it is thought to be."""
         x = np.r_[np.zeros(self.thrusts + 1), self.priors.fall_s, self.priors.center_m, np.zeros(len(self.sigmas) - 4)]
+        if _LASTING in self.names:
+            x[self.names.index(_LASTING)] = _HALF
         u, v = [], []
         for c in self.chains:
             given = np.einsum("kdj,kj->kd", c.arms(self._center(x)), c.effective(self._valve(x)))
@@ -208,14 +217,24 @@ class _Model:
             more[:, g] = x[self.names.index(name)] * c.spread[:, g]
         lighter = 1 - x[self.names.index("mass")] if c.turn is None else 1.0
         arms, effective = lighter * c.arms(self._center(x)), c.effective(valve, more)
-        per_newton = arms * effective[:, None, :]
+        longs = {self.names.index(n): course for n, course in c.long.items()}
+        own = effective.copy()  # with what pulses of minutes give more or less than the others
+        for k, (j, on) in longs.items():
+            own[:, j] += x[k] * on
+        if _LASTING in self.names:
+            own -= x[self.names.index(_LASTING)] * c.weak * effective
+        per_newton = arms * own[:, None, :]
         columns = np.zeros((K, c.width, len(x)))
         steps = (per_newton * F).sum(axis=2)
         columns[:, :, : self.thrusts] = per_newton[:, :, self.fired]
         later = c.effective(replace(valve, fall_s=valve.fall_s + 1e-5), more)
         columns[:, :, self.thrusts + 1] = (arms * ((later - effective) / 1e-5)[:, None, :] * F).sum(axis=2)
         for k, moved in enumerate(c.arms_by_center()):
-            columns[:, :, self.thrusts + 2 + k] = (moved * (effective * F)[:, None, :]).sum(axis=2)
+            columns[:, :, self.thrusts + 2 + k] = (moved * (own * F)[:, None, :]).sum(axis=2)
+        if _LASTING in self.names:
+            columns[:, :, self.names.index(_LASTING)] = -(arms * (effective * c.weak * F)[:, None, :]).sum(axis=2)
+        for k, (j, on) in longs.items():
+            columns[:, :, k] = arms[:, :, j] * (F[j] * on)[:, None]
         for name, g in groups.items():
             added = (arms * (c.spread * valve.added() * F)[:, None, :])[:, :, g]
             columns[:, :, self.names.index(name)] = added.sum(axis=2)
@@ -266,4 +285,6 @@ class _Model:
         precision[np.arange(j + 1, size), np.arange(j + 1, size)] = 1 / self.sigmas**2
         centre[j + 1] = self.priors.fall_s
         centre[j + 2 : j + 5] = self.priors.center_m
+        if _LASTING in self.names:
+            centre[self.names.index(_LASTING)] = _HALF
         return precision, centre, 0.5 * j * np.log(one)

@@ -14,7 +14,8 @@ from .accelerometer import along_of, burn_of
 from .counters import counters_of, step_of
 from .firings import firings_of
 from .subject import subject_of
-from .thrust_evidence import check_names, common_of, doubts_of, event_seen, valve_of
+from .thrust_contradictions import check_counted, check_names
+from .thrust_evidence import common_of, doubts_of, event_seen, valve_of
 from .thrust_printed import printed_thrust
 from .thrust_priors import Priors
 from .thrust_result import ThrustResult
@@ -24,6 +25,7 @@ def printed_result(telemetry: list[Telemetry], craft: Craft, variant: str, prior
     records = [firings_of(t, craft) for t in telemetry]
     doubts = []
     for f in records:
+        check_counted(f, craft)
         check_names(f, priors)
     center = craft.center_of_mass or priors.center_m
     if craft.center_of_mass is None:

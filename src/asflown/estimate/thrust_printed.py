@@ -45,8 +45,8 @@ def printed_thrust(records: list[Firings], center_m) -> Printed:
     """All records stacked, one set of thrusts; centre of mass (3,) [m] as given, the papers say no value."""
     thrusters = records[0].thrusters
     Q = moment_matrix([t.position for t in thrusters], [t.direction for t in thrusters], center_m)
-    V = np.concatenate([balance(f) for f in records])
-    on = np.concatenate([f.known.on_time_s[1:] - f.known.on_time_s[0] for f in records])
+    V = np.concatenate([balance(f)[~f.at_limit[1:]] for f in records])
+    on = np.concatenate([(f.known.on_time_s[1:] - f.known.on_time_s[0])[~f.at_limit[1:]] for f in records])
     U = Q[None] * on[:, None, :]  # (N, 3, j)
     names = [t.name for t in thrusters]
     fired = on[-1] > 0 if len(records) == 1 else (on > 0).any(axis=0)

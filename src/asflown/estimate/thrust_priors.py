@@ -53,7 +53,7 @@ class Priors:
         mass = "" if self.mass_kg is None else f"; mass {self.mass_kg:g} kg to {100 * self.mass_share:g} %"
         return (
             f"fall time {1e3 * self.fall_s:g} +- {1e3 * self.fall_sigma_s:g} ms; centre of mass {middle} m; pulses to "
-            f"{100 * self.pulse_scatter:g} %, thrusters alike to {100 * self.unlike:g} %; spin inertia to {100 * self.spin_share:g} %{mass}"
+            f"{100 * self.pulse_scatter:g} %, thrusters alike to {100 * self.unlike:g} %; spin inertia to {100 * self.spin_share:g} %, inertia to {100 * self.inertia_share:g} %{mass}"
         )
 
 
@@ -64,7 +64,11 @@ def priors_for(
     fall_sigma_s: float | None = None,
     center_sigma_m=None,
     pulse_scatter: float | None = None,
+    unlike: float | None = None,
+    spin_share: float | None = None,
+    inertia_share: float | None = None,
     mass_kg: float | None = None,
+    mass_share: float | None = None,
 ) -> Priors:
     """Those of a craft, with what the user says instead.  Raises BadInput for a craft without thrusters and for a value that
     no prior can have."""
@@ -81,6 +85,14 @@ def priors_for(
         raise BadInput(
             f"a pulse scatter of {pulse_scatter:g} is no share", remedy="Give a number from 0 to 1: 0.02 is 2 %."
         )
+    for value, option in (
+        (unlike, "--unlike"),
+        (spin_share, "--spin-sigma"),
+        (inertia_share, "--inertia-sigma"),
+        (mass_share, "--mass-sigma"),
+    ):
+        if value is not None and not 0 < value < 1:
+            raise BadInput(f"{option} {value:g} is no share", remedy="Give a number between 0 and 1: 0.02 is 2 %.")
     if center_sigma_m is not None and not min(center_sigma_m) > 0:
         raise BadInput("a sigma of the centre of mass is not positive", remedy="Give three lengths above zero.")
     own = [t.fall for t in craft.thrusters if t.fall > 0]
@@ -101,6 +113,10 @@ def priors_for(
         center_m=center,
         center_sigma_m=tuple(center_sigma_m) if center_sigma_m is not None else sigma,
         pulse_scatter=PULSE_SCATTER if pulse_scatter is None else pulse_scatter,
+        unlike=UNLIKE if unlike is None else unlike,
+        spin_share=SPIN_SHARE if spin_share is None else spin_share,
+        inertia_share=INERTIA_SHARE if inertia_share is None else inertia_share,
         mass_kg=mass_kg,
+        mass_share=MASS_SHARE if mass_share is None else mass_share,
         doubts=tuple(doubts),
     )

@@ -68,6 +68,8 @@ def save_leak_figure(result: LeakResult, path) -> None:
     what = "no alarm"
     if result.alarm:
         what = f"{result.thruster or 'unknown thruster'} {'is weak' if result.kind == 'weak' else 'leaks'}"
+        if result.together:
+            what = f"momentum as of {', '.join(result.together)} together"
     momentum.set_title(f"Leak monitor of {result.craft}, {result.method}: {what}", loc="left", fontsize=10)
     if result.doubts:
         text = "\n".join(textwrap.fill("DOUBT " + d, 125) for d in result.doubts[:4])

@@ -120,7 +120,7 @@ def fly(scenario, *, craft=None, seed: int | None = None, noise: str | None = No
     names = tuple(w.name for w in now.wheels)
     x = _start(scenario, now, plant, q_c[0])
     thrusters = thrusters_of(scenario, now, times, loop.period)
-    record = np.zeros((len(times), len(x) + 18 + 3 * len(now.wheels) + 3 * len(thrusters.delay)))
+    record = np.zeros((len(times), len(x) + 18 + 3 * len(now.wheels) + 4 * len(thrusters.delay)))
     tell(f"flying {scenario.name}: {scenario.settle + scenario.duration:g} s in {len(times)} control cycles")
     off = coasting(scenario, names, times)
     flown, full = fly_cycles(plant, loop, errors, thrusters, off, q_c, w_c, alpha_c, times[0], x, record)
@@ -141,7 +141,9 @@ def fly(scenario, *, craft=None, seed: int | None = None, noise: str | None = No
     tell(ended)
 
     columns = _Columns(len(now.wheels), plant, len(thrusters.delay))
-    fired = thruster_truth(rows, columns, thrusters, now.craft, loop.period, before) if scenario.thrusters else None
+    fired = None
+    if scenario.thrusters is not None:
+        fired = thruster_truth(rows, columns, thrusters, scenario, now.craft, times, loop.period, before)
     truth = _truth(rows, times, columns, plant, now, scenario, part, fired, met)
     command = (w_c[before:flown], q_c[before:flown])
     readings = _readings(rows, columns, truth, command, now, scenario, part)
@@ -227,7 +229,7 @@ class _Columns:
         widths = {"attitude": 4, "rate": 3, "wheel_rate": n, "mode": m, "mode_rate": m, "ledger": 4, "estimation_error": 3,
                   "attitude_error": 3, "rate_estimate": 3, "controller_rate_error": 3, "control_torque": 3,
                   "motor_torque": n, "drag_estimate": n, "wheel_reading": n, "outside": 3, "on": j, "thrust": j,
-                  "impulse": j}  # fmt: skip
+                  "impulse": j, "chill": j}  # fmt: skip
         at = 0
         for name, width in widths.items():
             setattr(self, name, slice(at, at + width))
@@ -295,7 +297,7 @@ def _readings(rows, columns, truth: Truth, command, now: CraftAt, scenario: Scen
     if scenario.controller.friction_compensation:
         readings |= axes_of("wheel_drag_torque", rows[:, columns.drag_estimate], wheels)
     if truth.thrusters is not None:
-        readings |= thruster_readings(truth.thrusters)
+        readings |= thruster_readings(truth.thrusters, scenario, now.craft)
         if scenario.telemetry.accelerometer_count:
             readings |= accelerometer_reading(truth.thrusters, scenario, now.craft, truth.time_s)
     if part is not None and scenario.cover is not None:

@@ -91,7 +91,7 @@ class Errors(NamedTuple):
 class Thrusters(NamedTuple):
     """Thrusters and what is ordered of them; no rows where a flight has none.  N counts cycles, j thrusters."""
 
-    in_control: bool  # they hold the attitude, and the wheels' rates are ordered
+    in_control: np.ndarray  # (N,) bool, they hold the attitude, and the wheels' rates are ordered; else the wheels do
     arms: np.ndarray  # (j, 3), torque about the centre of mass per newton [m]
     steady: np.ndarray  # (N, j), what a pulse that starts in this cycle rises to [N]
     leak: np.ndarray  # (N, j), thrust whatever is ordered [N]
@@ -390,8 +390,10 @@ def fly_cycles(plant, loop, errors, thrusters, coasting, q_c, w_c, alpha_c, firs
     Row: state, then estimation error (3), attitude error (3), estimated rate (3), controller rate
     error (3), commanded torque on the body (3), motor torques (n), drag estimates (n), measured wheel
     rates (n), torque from outside in place of coasting wheels (3), and of each thruster whether it is on, thrust,
-    impulse so far, leaks included (j each).  Where ``coasting``, (N, n) bool, a wheel's motor is off, and what it
-    would have given the body comes from outside, exactly and at once.  Returns the rows written and the wheel that reached its rate limit (-1: none)."""
+    impulse so far, leaks included, and how cold its bed is (j each).  Where ``coasting``, (N, n) bool, a wheel's motor is off,
+    and what it would have given the body comes from outside, exactly and at once.  A wheel at its rate limit ends the flight
+    where the wheels hold the attitude; under thruster control its motor takes it no further.  Returns the rows written and the
+    wheel that ended the flight (-1: none)."""
     n, size = len(plant.spin_inertia), len(x)
     cycles = len(record)
     work = np.empty((5, size))
@@ -414,6 +416,7 @@ def fly_cycles(plant, loop, errors, thrusters, coasting, q_c, w_c, alpha_c, firs
     spin = x[7 : 7 + n].copy()  # wheel rates ordered
 
     for cycle in range(cycles):
+        held = fired > 0 and thrusters.in_control[cycle]
         t = first_time + cycle * loop.period
         if cycle > 0:
             offset += errors.gyro[cycle] * loop.period
@@ -446,7 +449,7 @@ def fly_cycles(plant, loop, errors, thrusters, coasting, q_c, w_c, alpha_c, firs
         if loop.gyroscopic_feedforward:
             _cross(w_c[cycle], believed, feed)
             torque += feed
-        if thrusters.in_control:
+        if held:
             torque[:] = 0.0
 
         for k in range(n):
@@ -469,7 +472,9 @@ def fly_cycles(plant, loop, errors, thrusters, coasting, q_c, w_c, alpha_c, firs
                 for i in range(3):
                     outside[i] -= ordered[k] * plant.wheel_axes[k, i]
                 continue
-            if thrusters.in_control:
+            if not held:
+                spin[k] = measured[k]  # where thrusters take over the wheels stay at the rates they have
+            else:
                 speed_up = WHEEL_RATE_GAIN * (spin[k] - measured[k])
                 if not np.isnan(thrusters.spin_order[cycle, k]):
                     slope = (thrusters.spin_order[cycle, k] - spin[k]) / (thrusters.spin_cycles[cycle, k] * loop.period)
@@ -477,8 +482,14 @@ def fly_cycles(plant, loop, errors, thrusters, coasting, q_c, w_c, alpha_c, firs
                     speed_up += slope
                 ordered[k] = plant.spin_inertia[k] * speed_up
             motor[k] = min(max(ordered[k] + drag_estimate[k], -loop.torque_limit[k]), loop.torque_limit[k])
+            if held and abs(x[7 + k]) >= loop.rate_limit[k] and motor[k] * x[7 + k] > 0.0:
+                motor[k] = 0.0
 
-        if thrusters.in_control:
+        if fired > 0 and not held:
+            on[:] = False
+            push[:] = 0.0
+            burn = -1
+        if held:
             if burn < 0 and next_burn < len(thrusters.burn_start) and cycle >= thrusters.burn_start[next_burn]:
                 burn, next_burn, burnt = next_burn, next_burn + 1, 0.0
             if burn >= 0 and burnt >= thrusters.burn_on_time[burn]:
@@ -504,9 +515,10 @@ def fly_cycles(plant, loop, errors, thrusters, coasting, q_c, w_c, alpha_c, firs
         row[size + 15 + 3 * n : size + 18 + 3 * n] = outside
         row[size + 18 + 3 * n : size + 18 + 3 * n + fired] = on
         row[size + 18 + 3 * n + fired : size + 18 + 3 * n + 2 * fired] = thrust
-        row[size + 18 + 3 * n + 2 * fired :] = impulse
+        row[size + 18 + 3 * n + 2 * fired : size + 18 + 3 * n + 3 * fired] = impulse
+        row[size + 18 + 3 * n + 3 * fired :] = chill
         for k in range(n):
-            if abs(x[7 + k]) >= loop.rate_limit[k]:
+            if not held and abs(x[7 + k]) >= loop.rate_limit[k]:
                 return cycle + 1, k
         if fired == 0:
             advance(t, x, motor, outside, plant, step, loop.substeps, work)

@@ -205,12 +205,20 @@ class CatalystBeds(Part):
     cold_fall: Second = Field(default=0.090, ge=0)
     heating: Second = Field(default=2.0, gt=0)
     cooling: Second = Field(default=900.0, gt=0)
+    # what telemetry says of a bed that its heater keeps warm, and of one that fires; assumed
+    cold_temperature: Kelvin = Field(default=420.0, gt=0)  # type: ignore[valid-type]
+    hot_temperature: Kelvin = Field(default=900.0, gt=0)  # type: ignore[valid-type]
 
 
 class ThrusterUse(Part):
-    """The craft's thrusters, holding the attitude unless ``control`` is false."""
+    """The craft's thrusters, holding the attitude unless ``control`` is false.
+
+    ``branch``: the one whose valves open, taken to sit where the craft's do (001 gives the places of branch A alone, 002 calls
+    the two identical); ``counted_branch``: the one whose on-times reach the ground, where it is not the one that opens."""
 
     control: bool = True
+    branch: str | None = None  # the craft's own
+    counted_branch: str | None = None  # whichever opens
     thrust: Newton | None = Field(default=None, gt=0)  # the craft's own on the date
     center_of_mass: MetreVector | None = None  # where the craft's file has none
     deadband: AngleVector = (2e-3, 2e-3, 2e-3)  # 001 section V
@@ -226,6 +234,27 @@ class ThrusterUse(Part):
         return self
 
 
+class ThrusterControl(Part):
+    """A span in which thrusters hold the attitude; outside of all such spans the wheels do."""
+
+    start: Second
+    stop: Second
+
+    @model_validator(mode="after")
+    def _forward(self):
+        if self.stop <= self.start:
+            raise ValueError("thruster control stops after it starts")
+        return self
+
+
+class BranchSwap(Part):
+    """From ``start`` on the other branch's valves open, with a thrust of their own or with the same."""
+
+    start: Second
+    branch: str
+    thrust: Newton | None = Field(default=None, gt=0)
+
+
 class ThrusterFault(Part):
     """A thruster that leaks, whatever is ordered of it, or whose pulses are weak."""
 
@@ -237,7 +266,7 @@ class ThrusterFault(Part):
 
 
 class WheelBias(Part):
-    """Wheels brought to new rates in straight lines while thrusters hold the attitude."""
+    """Wheels brought to new rates in straight lines while thrusters hold the attitude, as far as their rate limits let them."""
 
     start: Second
     stop: Second
@@ -327,6 +356,10 @@ class Sampling(Part):
     on_time: Second = 16.0  # thrusters' counters, only where the flight has any
     pulse_count: Second = 0.0
     accelerometer_count: Second = 0.0
+    control_mode: Second = 64.0  # RCS or RWA
+    thruster_branch: Second = 64.0
+    catbed_temperature: Second = 0.0
+    tank_pressure: Second = 0.0  # only where the craft's file ties it to the thrust
     wheel_drag_torque: Second = 4.0  # only where the controller estimates it
     mechanism: Second = 64.0  # cover angle, motor current, temperature and states
     quantum: dict[str, str] = Field(default_factory=dict)  # family -> one count, with its unit
@@ -388,6 +421,8 @@ class Scenario(Plan):
     coasts: tuple[Coast, ...] = ()
     drag_spikes: tuple[DragSpike, ...] = ()
     thrusters: ThrusterUse | None = None
+    thruster_control: tuple[ThrusterControl, ...] = ()
+    branch_swaps: tuple[BranchSwap, ...] = ()
     thruster_faults: tuple[ThrusterFault, ...] = ()
     wheel_biases: tuple[WheelBias, ...] = ()
     burns: tuple[Burn, ...] = ()
@@ -412,6 +447,20 @@ class Scenario(Plan):
             raise ValueError("a flyby with gravity_gradient is flown at one attitude: no slews")
         if (self.wheel_biases or self.burns) and not (self.thrusters and self.thrusters.control):
             raise ValueError("wheel_biases and burns need [thrusters] that hold the attitude")
+        if (self.thruster_control or self.branch_swaps) and self.thrusters is None:
+            raise ValueError("thruster_control and branch_swaps are of a flight with [thrusters]")
+        if self.thruster_control:
+            if self.thrusters is not None and not self.thrusters.control:
+                raise ValueError("thrusters with control = false never hold the attitude: leave out thruster_control")
+            spans = [(c.start, c.stop) for c in self.thruster_control]
+            for what, start, stop in (
+                *(("a wheel bias", b.start, b.stop) for b in self.wheel_biases),
+                *(("a burn", b.start, b.start) for b in self.burns),
+            ):
+                if not any(a <= start and stop <= b for a, b in spans):
+                    raise ValueError(f"{what} ({start:g} to {stop:g} s) lies outside thruster_control")
+        if any(b.start < a.start for a, b in pairwise(self.branch_swaps)):
+            raise ValueError("branch_swaps: in order of their start")
         if any(b.start < a.start for a, b in pairwise(self.burns)):
             raise ValueError("burns: in order of their start")
         return self

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,9 @@ class ThrusterTruth:
     thrust_N: np.ndarray  # (N, j), leaks left out
     leak_N: np.ndarray  # (N, j), until the next instant
     impulse_Ns: np.ndarray  # (N, j), since the epoch, leaks included
+    chill: np.ndarray  # (N, j), how cold each catalyst bed is: 1 at rest, 0 hot
+    in_control: np.ndarray  # (N,) bool, whether they hold the attitude
+    branch: np.ndarray  # (N,) str, the one whose valves open
     period_s: float
 
     @property
@@ -66,7 +69,9 @@ class ThrusterTruth:
         return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
 
 
-def thruster_truth(rows, columns, thrusters: Thrusters, craft: Craft, period: float, before: int) -> ThrusterTruth:
+def thruster_truth(
+    rows, columns, thrusters: Thrusters, scenario: Scenario, craft: Craft, times, period: float, before: int
+) -> ThrusterTruth:
     """From the rows of the plant's record since the epoch, which is ``before`` cycles after the flight's start."""
     recorded, impulse = slice(before, before + len(rows)), rows[:, columns.impulse]
     return ThrusterTruth(
@@ -81,6 +86,9 @@ def thruster_truth(rows, columns, thrusters: Thrusters, craft: Craft, period: fl
         thrust_N=rows[:, columns.thrust],
         leak_N=thrusters.leak[recorded],
         impulse_Ns=impulse - impulse[0],
+        chill=rows[:, columns.chill],
+        in_control=thrusters.in_control[recorded],
+        branch=branches(scenario, craft, times),
         period_s=period,
     )
 
@@ -88,7 +96,7 @@ def thruster_truth(rows, columns, thrusters: Thrusters, craft: Craft, period: fl
 def no_thrusters(wheels: int) -> Thrusters:
     none = np.empty((0, 0))
     return Thrusters(
-        in_control=False, arms=np.empty((0, 3)), steady=none, leak=none, delay=np.empty(0), rise=np.empty((2, 0)),
+        in_control=np.empty(0, np.bool_), arms=np.empty((0, 3)), steady=none, leak=none, delay=np.empty(0), rise=np.empty((2, 0)),
         fall=np.empty((2, 0)), heating=1.0, cooling=1.0, serves=np.empty((0, 3)), lead=0.0, approach_rate=0.0,
         hysteresis=0.0, deadband=np.empty((1, 3)), burn_start=np.empty(0), burn_on_time=np.empty(0),
         burns=np.empty(0, bool), spin_order=np.empty((0, wheels)), spin_cycles=np.empty((0, wheels)),
@@ -116,6 +124,9 @@ def thrusters_of(scenario: Scenario, now: CraftAt, times, period: float) -> Thru
         acts = _between(times, fault.start, fault.stop)
         steady[acts, names.index(fault.thruster)] *= fault.factor
         leak[acts, names.index(fault.thruster)] += fault.leak
+    for swap in scenario.branch_swaps:
+        if swap.thrust is not None:
+            steady[times > swap.start - 1e-9] *= swap.thrust / thrust
     steady *= 1 + normal(scenario.seed, "pulse scatter", steady.shape, use.pulse_scatter)
     rise, fall, beds = _lags(use, craft)
     delay = np.array([t.delay for t in craft.thrusters])
@@ -133,7 +144,7 @@ def thrusters_of(scenario: Scenario, now: CraftAt, times, period: float) -> Thru
     wanted = [b.delta_v * scenario.known_mass("a burn") / (b.thrust or thrust) for b in scenario.burns]
     order, left = _spin_orders(scenario, now, times)
     return Thrusters(
-        in_control=use.control,
+        in_control=_in_control(scenario, times),
         arms=arms(craft, use),
         steady=steady,
         leak=leak,
@@ -167,9 +178,37 @@ def arms(craft: Craft, use: ThrusterUse) -> np.ndarray:
     return np.cross(at - middle, along)
 
 
-def thruster_readings(truth: ThrusterTruth) -> dict[str, np.ndarray]:
-    """Cumulative on-times and pulse counts."""
-    return axes_of("on_time", truth.on_time_s, truth.names) | axes_of("pulse_count", truth.pulses, truth.names)
+def branches(scenario: Scenario, craft: Craft, times) -> np.ndarray:
+    """The branch whose valves open, at each time, (N,) str: '' where neither scenario nor craft names one."""
+    own = next((t.branch for t in craft.thrusters if t.branch), "")
+    assert scenario.thrusters is not None
+    out = np.full(len(times), scenario.thrusters.branch or own, dtype=object)
+    for swap in scenario.branch_swaps:
+        out[times > swap.start - 1e-9] = swap.branch
+    return out.astype(str)
+
+
+def thruster_readings(truth: ThrusterTruth, scenario: Scenario, craft: Craft) -> dict[str, np.ndarray]:
+    """Cumulative on-times and pulse counts, of the branch that is counted; who holds the attitude, with which branch;
+    warmth of the beds, pressure of the tank."""
+    use = scenario.thrusters
+    assert use is not None
+    counted = truth
+    if use.counted_branch is not None:
+        counted = replace(truth, on=truth.on & (truth.branch == use.counted_branch)[:, None])
+    readings = axes_of("on_time", counted.on_time_s, truth.names)
+    readings |= axes_of("pulse_count", counted.pulses, truth.names)
+    readings["control_mode"] = np.where(truth.in_control, "RCS", "RWA")
+    if (truth.branch != "").all():
+        readings["thruster_branch"] = truth.branch
+    beds = use.catalyst_beds or CatalystBeds()
+    cold, hot = float(beds.cold_temperature), float(beds.hot_temperature)
+    warmth = hot + truth.chill * (cold - hot)
+    readings |= axes_of("catbed_temperature", warmth, truth.names)
+    if craft.blow_down is not None:
+        thrust = use.thrust or craft.thrust_at(scenario.epoch_ns)
+        readings["tank_pressure"] = np.full(len(truth.on), craft.blow_down.pressure_at(thrust))
+    return readings
 
 
 def accelerometer_reading(truth: ThrusterTruth, scenario: Scenario, craft: Craft, times) -> dict[str, np.ndarray]:
@@ -226,6 +265,15 @@ def _lags(use: ThrusterUse, craft: Craft) -> tuple[np.ndarray, np.ndarray, Catal
     rise = [t.rise if use.rise is None else use.rise for t in craft.thrusters]
     fall = [t.fall if use.fall is None else use.fall for t in craft.thrusters]
     return np.array([rise, rise], float), np.array([fall, fall], float), CatalystBeds()
+
+
+def _in_control(scenario: Scenario, times) -> np.ndarray:
+    """Whether thrusters hold the attitude in the cycle that begins at each time, (N,) bool."""
+    use = scenario.thrusters
+    assert use is not None
+    if not scenario.thruster_control:
+        return np.full(len(times), use.control)
+    return np.any([_between(times, c.start, c.stop) for c in scenario.thruster_control], axis=0)
 
 
 def _between(times, start: float, stop: float) -> np.ndarray:
