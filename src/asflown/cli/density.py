@@ -6,7 +6,20 @@ from pathlib import Path
 
 import typer
 
-from .flyby_options import AREA, ARM, AXIS, CLOSEST, FLYBY, METHOD, UP, VELOCITY, drag_from
+from .flyby_options import (
+    AREA,
+    ARM,
+    AXIS,
+    CLOSEST,
+    DRAG_TABLE,
+    FLYBY,
+    METHOD,
+    SOURCE,
+    UP,
+    VELOCITY,
+    drag_from,
+    sources_from,
+)
 from .options import (
     CHANNELS,
     CRAFT,
@@ -35,6 +48,8 @@ def density(
     ),
     area: str = AREA,
     arm: str = ARM,
+    drag_table: Path = DRAG_TABLE,
+    source: list[str] = SOURCE,
     velocity: str = VELOCITY,
     up: str = UP,
     start: str = START,
@@ -51,8 +66,10 @@ def density(
     check_picture(plot)
     ship = craft_from(craft, inertia, None)
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
-    drag = drag_from(axis, method, area, arm, velocity, up)
-    result = density_of(telemetry, ship, flyby, closest_approach, variant=variant, **drag)
+    drag = drag_from(axis, method, area, arm, velocity, up, drag_table)
+    result = density_of(
+        telemetry, ship, flyby, closest_approach, variant=variant, sources=sources_from(source, flyby), **drag
+    )
     if plot is not None:
         from asflown.plots.density import save_density_figure
 
@@ -60,10 +77,10 @@ def density(
         say(f"wrote {plot}")
     if json:
         options = {"craft": craft, "flyby": result.flyby.name, "closest_approach": closest_approach, "axis": result.axis,
-                   "method": result.method, "variant": variant, "area": area, "arm": arm, "velocity": velocity, "up": up,
+                   "method": result.method, "variant": variant, "area": area, "arm": arm, "drag_table": None if drag_table is None else str(drag_table), "source": source, "velocity": velocity, "up": up,
                    "start": start, "stop": stop, "inertia": inertia}  # fmt: skip
         record = {"command": "density"} | result.record()
-        print_json(record | {"provenance": provenance(inputs | hashes(craft), options)})
+        print_json(record | {"provenance": provenance(inputs | hashes(craft, drag_table), options)})
         return
     print(result)
     print_doubts(result.doubts)

@@ -6,7 +6,20 @@ from pathlib import Path
 
 import typer
 
-from .flyby_options import AREA, ARM, AXIS, CLOSEST, FLYBY, METHOD, UP, VELOCITY, drag_from
+from .flyby_options import (
+    AREA,
+    ARM,
+    AXIS,
+    CLOSEST,
+    DRAG_TABLE,
+    FLYBY,
+    METHOD,
+    SOURCE,
+    UP,
+    VELOCITY,
+    drag_from,
+    sources_from,
+)
 from .options import (
     CHANNELS,
     CRAFT,
@@ -32,10 +45,15 @@ def jets(
     method: str = METHOD,
     sources: str = typer.Option(None, "--sources", help='Which of "Alexandria,Cairo,Damascus"; all unless given.'),
     widths: str = typer.Option("own", "--widths", help="Each jet its own, or one common."),
+    fit: str = typer.Option(
+        "momentum", "--fit", help="To momentum; forward: through the loop to all telemetry; printed: 004's simplex."
+    ),
     power: float = typer.Option(1.0, "--power", help="n of exp(-(angle/width)^n): 1 as 004 eq 26 stands, 2 as eq 24."),
     angle: str = typer.Option("plane", "--angle", help="From a jet's axis: in the flyby's plane, or in space."),
     area: str = AREA,
     arm: str = ARM,
+    drag_table: Path = DRAG_TABLE,
+    source: list[str] = SOURCE,
     velocity: str = VELOCITY,
     up: str = UP,
     start: str = START,
@@ -46,17 +64,18 @@ def jets(
     plot: Path = typer.Option(None, "--plot", help="Draw jets and density (SVG, PNG or PDF by its suffix)."),
     json: bool = JSON,
 ) -> None:
-    """Densities and widths of a plume's jets, from the momentum they gave a craft; what the telemetry does not tell is said."""
+    """Densities and widths of a plume's jets, from what they did to a craft; what the telemetry does not tell is said."""
     from asflown.estimate.jets import jets as fitted_jets
 
     check_picture(plot)
     ship = craft_from(craft, inertia, None)
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
-    drag = drag_from(axis, method, area, arm, velocity, up)
-    names = None if sources is None else [n.strip().capitalize() for n in sources.split(",")]
+    drag = drag_from(axis, method, area, arm, velocity, up, drag_table)
+    names = None if sources is None else [n.strip() for n in sources.split(",")]
     result = fitted_jets(
-        telemetry, ship, flyby, closest_approach, names=names, widths=widths, power=power, angle=angle, **drag
-    )
+        telemetry, ship, flyby, closest_approach, names=names, sources=sources_from(source, flyby), widths=widths, fit=fit,
+        power=power, angle=angle, **drag,
+    )  # fmt: skip
     if plot is not None:
         from asflown.plots.density import save_jets_figure
 
@@ -64,10 +83,10 @@ def jets(
         say(f"wrote {plot}")
     if json:
         options = {"craft": craft, "flyby": result.density.flyby.name, "closest_approach": closest_approach, "axis": axis, "method": method,
-                   "sources": sources, "widths": widths, "power": power, "angle": angle, "area": area, "arm": arm, "velocity": velocity,
+                   "sources": sources, "widths": widths, "fit": fit, "power": power, "angle": angle, "area": area, "arm": arm, "drag_table": None if drag_table is None else str(drag_table), "source": source, "velocity": velocity,
                    "up": up, "start": start, "stop": stop, "inertia": inertia}  # fmt: skip
         record = {"command": "jets"} | result.record()
-        print_json(record | {"provenance": provenance(inputs | hashes(craft), options)})
+        print_json(record | {"provenance": provenance(inputs | hashes(craft, drag_table), options)})
         return
     print(result)
     print_doubts(result.doubts)
