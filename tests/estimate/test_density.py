@@ -116,7 +116,7 @@ def test_law_several_axes_tell_one_density_better_and_whether_they_agree(tmp_pat
     assert both.agreement.p > 1e-3
     f, table = oblique(tmp_path, share_y=0.3)
     wrong = density(f.telemetry, CASSINI, "E3", CLOSEST, **how)
-    assert wrong.agreement.p < 1e-6 and any("does not explain the torque about y, z" in d for d in wrong.doubts)
+    assert wrong.agreement.p < 1e-4 and any("does not explain the torque about y, z" in d for d in wrong.doubts)
 
 
 @pytest.mark.slow

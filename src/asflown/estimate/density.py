@@ -53,22 +53,24 @@ def density(
     axis: str | None = None,
     method: str | None = None,
     variant: str = "corrected",
+    order: int = 12,
     area_m2: float | None = None,
     arm_m: float | None = None,
     drag_table=None,
     velocity_B=None,
     up_B=None,
     sources: tuple[Jet, ...] | None = None,
+    cusps: bool = True,
 ) -> DensityResult:
     """Density along a flyby. [kg/m3]
 
     ``closest_approach``: UTC, or seconds from the telemetry's epoch.  ``axis``: about which gas turns the craft.  ``method``:
     of ``disturbance_torque``.  ``variant``: 'corrected', or 'printed': 004's constant for E3, its judged errors, its torque (by
-    the reduced loop unless a method is named), no gravity gradient.  ``area_m2``, ``arm_m``: in place of the craft's.
+    the reduced loop unless a method is named), no gravity gradient.  ``order``: of the polynomial method.  ``area_m2``, ``arm_m``: in place of the craft's.
     ``drag_table``: CSV of time from closest approach, speed, area and arm vector, in place of all of them; all its axes together
     unless ``axis`` names one.  ``velocity_B``, ``up_B``: direction of flight, and from the moon to the craft at closest approach,
     in the axes of a body that does not turn; both, or none.  ``sources``: of jets near which a peak may have a cusp, those
-    published unless given.
+    published unless given; ``cusps``: whether one is looked for, which takes as long as all else.
 
     Raises BadInput where drag is not known, the record is not of the flyby, or the torque cannot be had."""
     where = flyby_called(flyby) if isinstance(flyby, str) else flyby
@@ -90,7 +92,7 @@ def density(
         )
     about = drag.names if len(drag.axes) == 1 else "all"
     how = {"method": "transfer", "model": "hankel"} if printed and method is None else {"method": method}
-    torque = disturbance_torque(telemetry, craft, variant=variant, axis=about, **how)
+    torque = disturbance_torque(telemetry, craft, variant=variant, axis=about, order=order, **how)
     subject = subject_of(telemetry, craft)
     if torque.relative or subject.craft.relative:
         raise BadInput(
@@ -138,11 +140,11 @@ def density(
             f"one density does not explain the torque about {', '.join(drag.names)} (chi-square {agreement.chi_square:.1f} for {agreement.freedom:.0f}): arm, area, or another torque?"
         )
     drawn_s, drawn = _drawn(torque, axes, middle, time_s, K, weight, gravity)
-    cusps = None
-    if not printed and where.latitude_south_rad is not None and len(torque.evidence) >= len(axes):
-        cusps = _cusps(torque, drag, sign, where, middle, gravity, time_s, sources)
-    peak = _peak(time_s, rho, sigma, drag.scale, where, known, drawn_s, drawn, cusps)
-    doubts += _peak_doubts(peak, time_s, bound, known, gravity is not None, printed, cusps)
+    found = None
+    if cusps and not printed and where.latitude_south_rad is not None and len(torque.evidence) >= len(axes):
+        found = _cusps(torque, drag, sign, where, middle, gravity, time_s, sources)
+    peak = _peak(time_s, rho, sigma, drag.scale, where, known, drawn_s, drawn, found)
+    doubts += _peak_doubts(peak, time_s, bound, known, gravity is not None, printed, found)
     at_peak = sign * drag.at(peak.time_s)[axes]
     one = len(axes) == 1
     return DensityResult(
@@ -166,7 +168,7 @@ def density(
         beside=_beside(peak, where),
         doubts=tuple(dict.fromkeys(doubts)),
         agreement=agreement,
-        settings={"altitude_closest_m": where.altitude_m, **drag.settings, "peak": None if cusps is None else cusps.record(),
+        settings={"altitude_closest_m": where.altitude_m, **drag.settings, "peak": None if found is None else found.record(),
                   "torque": torque.settings},
         drag=drag,
         sign=sign,

@@ -65,7 +65,7 @@ def jets(
             f"{len(sources)} sources with {widths} widths are more than the {most} that can be told apart here",
             remedy="Use --widths common, or fewer sources.",
         )
-    met = density(telemetry, craft, where, closest_approach, sources=tuple(sources), **drag)
+    met = density(telemetry, craft, where, closest_approach, cusps=False, **drag)
     closest_s = float(telemetry.seconds(telemetry.moment(closest_approach)))
     data = (
         through_loop(met, sources, closest_s)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..dynamics.plume import Jet
+from ..dynamics.plume import Jet, plume_density
 from .density_result import DensityResult
 
 #: What the samples of a fit are.
@@ -94,8 +94,10 @@ class JetsResult:
     @property
     def peak(self) -> tuple[float, float]:
         """Largest density of the model [kg/m3] and its time from closest approach [s]."""
-        k = int(np.argmax(self.model_kgm3))
-        return float(self.model_kgm3[k]), float(self.density.time_s[k])
+        d, near = self.density, float(self.density.time_s[np.argmax(self.model_kgm3)])
+        t = np.arange(near - 2, near + 2, 0.05)  # a cusp lies between instants
+        rho = plume_density([s.jet for s in self.sources], d.flyby, t, power=self.power, angle=self.angle)
+        return float(rho.max()), float(t[np.argmax(rho)])
 
     def record(self) -> dict:
         """The JSON form, without command and provenance."""
