@@ -45,13 +45,10 @@ def draw_published_peaks(result: DensityResult, ax):
 
 
 def draw_noticed(result: DensityResult, ax):
-    """First and last instant at which the gas stands out, and 004's points P and R as triangles.  Returns ax."""
+    """First and last instant at which the gas stands out (triangles down), and 004's points P and R (up).  Returns ax."""
     n = result.noticed
     if n is not None:
-        for at in (n.first_s, n.last_s):
-            ax.axvline(
-                at, color=BLUE, linewidth=0.8, linestyle="--", label="gas stands out" if at == n.first_s else None
-            )
+        ax.plot([n.first_s, n.last_s], [0, 0], "v", color=BLUE, markersize=6, label="gas stands out from, to")
         if n.published_s is not None:
             ax.plot(n.published_s, [0, 0], "^", color=ORANGE, markersize=5, label="P and R, published")
     return ax
