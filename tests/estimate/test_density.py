@@ -31,6 +31,11 @@ def flown(seed=3, exponent=2, **more):
     return fly("quiet", craft=CASSINI, epoch=EPOCH, duration="480 s", seed=seed, torques=[plume], **more)
 
 
+@cache
+def fused():
+    return density(flown().telemetry, CASSINI, "E3", CLOSEST)
+
+
 def true_density(f, r):
     return -np.interp(r.time_s + CLOSEST_S, f.truth.time_s, f.truth.torque_Nm[:, 2]) / SCALE
 
@@ -105,7 +110,7 @@ def test_law_a_drag_table_of_constant_values_is_the_crafts_own_drag(tmp_path):
 
 def test_law_whitened_answers_add_up_to_those_of_the_torque():
     """Taking a torque off the data and off the regression is one thing: residuals and evidence agree."""
-    a = density(flown().telemetry, CASSINI, "E3", CLOSEST, cusps=False).evidence["z"]
+    a = fused().evidence["z"]
     nodes = np.arange(-20.0, 60.0, 2.0) + CLOSEST_S
     T = -0.01 * np.exp(-(((nodes - 210) / 12) ** 2))
     size = 0.1 * a.levels.torque_Nm
@@ -238,8 +243,7 @@ def test_recovery_of_the_peak_where_the_sources_are_not_those_published(power, t
 
 
 def test_recovery_along_the_flyby():
-    f = flown()
-    r = density(f.telemetry, CASSINI, "E3", CLOSEST)
+    f, r = flown(), fused()
     off = r.density_kgm3 - true_density(f, r)
     assert np.sqrt(np.mean(off**2)) < 0.02 * r.peak.density_kgm3
     assert np.std(off / r.sigma_shape_kgm3) < 2.0
@@ -257,12 +261,25 @@ def test_no_gas_is_said_to_be_none():
 
 
 def test_peaks_published_for_the_same_flyby_stand_beside():
-    r = density(flown().telemetry, CASSINI, "E3", CLOSEST)
+    r = fused()
     aacs, inms = r.beside
     assert inms.ratio == pytest.approx(r.peak.density_kgm3 / 1.8e-12)
     both = np.hypot(r.peak.sigma_kgm3 / r.peak.density_kgm3, 0.2 / 1.8)
     assert inms.sigma_ratio == pytest.approx(inms.ratio * both) and aacs.sigma_ratio is None
     assert inms.later_s == r.peak.time_s - 50
+
+
+def test_where_the_geometry_is_not_known_the_peak_is_that_of_the_curve():
+    with_it = fused()
+    without = density(flown().telemetry, CASSINI, "E5", CLOSEST, area_m2=18.4, arm_m=0.85)
+    assert (with_it.peak.way, without.peak.way) == ("of jets and a remainder", "of the curve")
+    assert (
+        without.peak.density_kgm3 == without.density_kgm3.max()
+        and without.peak.sigma_time_s > with_it.peak.sigma_time_s
+    )
+    assert any("smoothed curve" in d for d in without.doubts) and not any("smoothed curve" in d for d in with_it.doubts)
+    found = with_it.settings["peak"]
+    assert found["jets_probability"] > 0.9 and found["power_probability"]["2"] > found["power_probability"]["1"]
 
 
 def test_doubts():

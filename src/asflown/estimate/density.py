@@ -144,7 +144,8 @@ def density(
     if cusps and not printed and where.latitude_south_rad is not None and len(torque.evidence) >= len(axes):
         found = _cusps(torque, drag, sign, where, middle, gravity, time_s, sources)
     peak = _peak(time_s, rho, sigma, drag.scale, where, known, drawn_s, drawn, found)
-    doubts += _peak_doubts(peak, time_s, bound, known, gravity is not None, printed, found)
+    doubts += _peak_doubts(peak, time_s, bound, known, gravity is not None, printed)
+    doubts += _cusp_doubts(peak, found) if cusps else []
     at_peak = sign * drag.at(peak.time_s)[axes]
     one = len(axes) == 1
     return DensityResult(
@@ -303,7 +304,7 @@ def _date_doubts(telemetry: Telemetry, flyby: Flyby) -> list[str]:
     return [f"{flyby.name} was on {flyby.date}, and this record is of {utc_label(telemetry.epoch_ns)[:10]}"]
 
 
-def _peak_doubts(peak: DensityPeak, time_s, bound, known, gravity: bool, printed: bool, cusps) -> list[str]:
+def _peak_doubts(peak: DensityPeak, time_s, bound, known, gravity: bool, printed: bool) -> list[str]:
     doubts = []
     if peak.sigma_shape_kgm3 is not None and peak.density_kgm3 < 4 * peak.sigma_shape_kgm3:
         doubts.append("the largest density is below four sigma of its noise: no gas is seen, the peak is the noise's")
@@ -316,16 +317,21 @@ def _peak_doubts(peak: DensityPeak, time_s, bound, known, gravity: bool, printed
             f"gravity gradient is not taken off: up to {1e6 * np.interp(peak.time_s, time_s, bound):.0f} µN m at the peak, "
             f"{1e6 * bound[at]:.0f} at the instant nearest to closest approach (--velocity and --up would tell)"
         )
-    if peak.sigma_time_s is None:
-        doubts.append("this method does not say how well the peak's time is known")
-    elif cusps is None:
-        doubts.append(
-            "the peak's time is that of a smoothed curve: simulated flights whose density has a cusp (004 Table 3) give it 3 s early"
-        )
-    elif cusps.jets_probability < 0.5:
-        doubts.append(
-            "jets near the sources named do not explain the density: its peak is that of a smooth curve, early at a cusp"
-        )
-    elif cusps.leaning_probability > 0.9:
-        doubts.append("jets from the sources named explain the density only where they lean, or stand elsewhere")
     return doubts
+
+
+def _cusp_doubts(peak: DensityPeak, found: DrawnPeaks | None) -> list[str]:
+    """What there is to doubt of the peak's time."""
+    if peak.sigma_time_s is None:
+        return ["this method does not say how well the peak's time is known"]
+    if found is None:
+        return [
+            "the peak's time is that of a smoothed curve: simulated flights whose density has a cusp (004 Table 3) give it 3 s early"
+        ]
+    if found.jets_probability < 0.5:
+        return [
+            "jets near the sources named do not explain the density: its peak is that of a smooth curve, early at a cusp"
+        ]
+    if found.leaning_probability > 0.9:
+        return ["jets from the sources named explain the density only where they lean, or stand elsewhere"]
+    return []
