@@ -27,13 +27,13 @@ from ..dynamics.flyby import Flyby, flyby_called, published_peaks, tables
 from ..dynamics.plume import FARTHEST_M, Jet, as_passed, published_jets
 from ..kit.errors import BadInput
 from ..kit.quantities import quantity
-from ..kit.regression import memory
 from ..kit.timeline import utc_label
 from ..telemetry.telemetry import Telemetry
+from .density_axes import agreement_of, drawn_densities, weights
 from .density_peak import DrawnPeaks, draw_peaks
-from .density_result import Agreement, Beside, DensityPeak, DensityResult, Noticed
+from .density_result import Beside, DensityPeak, DensityResult, Noticed
 from .flyby_drag import PRINTED_SHAPE, DragAlong, flyby_drag
-from .result import AXES, TorqueResult, spread
+from .result import AXES, spread
 from .subject import slews, subject_of
 from .torque import disturbance_torque
 
@@ -128,18 +128,18 @@ def density(
     with np.errstate(divide="ignore", invalid="ignore"):
         each = of_gas / K
         of_each = None if torque.sigma_Nm is None else torque.sigma_Nm[:, axes] / np.abs(K)
-    weight = _weights(K, of_each)
+    weight = weights(K, of_each)
     rho = np.sum(np.where(weight > 0, weight * each, 0.0), axis=1)
     if printed:
         sigma = PRINTED_SHAPE * np.abs(rho)
     else:
         sigma = None if of_each is None else np.sqrt(np.sum(np.where(weight > 0, weight * of_each, 0.0) ** 2, axis=1))
-    agreement = _agreement(each[near], None if of_each is None else of_each[near], rho[near], known[near])
+    agreement = agreement_of(each[near], None if of_each is None else of_each[near], rho[near], known[near])
     if agreement is not None and agreement.p < 1e-3:
         doubts.append(
             f"one density does not explain the torque about {', '.join(drag.names)} (chi-square {agreement.chi_square:.1f} for {agreement.freedom:.0f}): arm, area, or another torque?"
         )
-    drawn_s, drawn = _drawn(torque, axes, middle, time_s, K, weight, gravity)
+    drawn_s, drawn = drawn_densities(torque, axes, middle, time_s, K, weight, gravity)
     found = None
     if cusps and not printed and where.latitude_south_rad is not None and len(torque.evidence) >= len(axes):
         found = _cusps(torque, drag, sign, where, middle, gravity, time_s, sources)
@@ -175,40 +175,6 @@ def density(
         sign=sign,
         evidence={a: torque.evidence[a] for a in drag.names if a in torque.evidence},
     )  # fmt: skip
-
-
-def _weights(K: np.ndarray, sigma) -> np.ndarray:
-    """Of each axis's density at each instant, together 1. (N, n)
-
-    By its noise; by the square of its torque per density where that is not known.  Zero where an arm is."""
-    precision = np.square(K) if sigma is None else 1 / np.square(sigma)
-    precision = np.where(np.isfinite(precision) & (K != 0), precision, 0.0)
-    return precision / np.maximum(precision.sum(axis=1, keepdims=True), 1e-300)
-
-
-def _agreement(each, sigma, rho, known) -> Agreement | None:
-    """Whether several axes tell one density: chi-square of what each leaves where gas is looked for, in independent instants.
-
-    How alike neighbours are is learnt where no gas is seen: amid it a disagreement itself would make them so."""
-    if sigma is None or each.shape[1] < 2:
-        return None
-    left = np.where(np.isfinite(each) & (sigma > 0), (each - rho[:, None]) / sigma, 0.0)
-    quiet = np.abs(each / sigma).max(axis=1) < _NOTICED
-    alike = max(memory(column[quiet if quiet.sum() > 50 else slice(None)]) for column in left.T)
-    return Agreement(float(np.sum(left[known] ** 2)) / alike, int(known.sum()) * (each.shape[1] - 1) / alike)
-
-
-def _drawn(torque: TorqueResult, axes, middle: float, time_s, K, weight, gravity):
-    """Instants from closest approach and densities (D, F) drawn from the torque's posterior; None where there is none."""
-    if torque.paths_Nm is None:
-        return None, None
-    t = torque.paths_time_s - middle
-    drawn = np.zeros(torque.paths_Nm.shape[:2])
-    for i, j in enumerate(axes):
-        off = 0.0 if gravity is None else np.interp(t, time_s, gravity[:, i])
-        k, w = np.interp(t, time_s, K[:, i]), np.interp(t, time_s, weight[:, i])
-        drawn += np.where(w > 0, w * (torque.paths_Nm[:, :, j] - off) / np.where(k == 0, np.inf, k), 0.0)
-    return t, drawn
 
 
 def _cusps(torque, drag: DragAlong, sign, flyby, middle, gravity, time_s, sources) -> DrawnPeaks:

@@ -13,7 +13,7 @@ its evidence in closed form; peaks are those of densities drawn from all of them
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
@@ -34,6 +34,11 @@ SHARES, HOLDS_M = (0.03, 0.1, 0.3), (700e3, 1000e3, FARTHEST_M)
 #: Of jets in one choice; of the span around closest approach; of nodes; of the drawn curves; of "thereabouts". [s]
 _MOST, _SPAN_S, _NODE_S, _FINE_S, _NEARBY_S = 3, (-60.0, 160.0), 0.5, 0.1, 10.0
 _DRAWS = 400
+#: Remainders' share and reach; the last is no jets and the smooth torque of the fitted levels' length.
+_WAYS = [(share, holds) for holds in HOLDS_M for share in SHARES] + [(1.0, 0.0)]
+_UPRIGHT = len(LEANS_RAD) // 2
+#: Torque per density at times from closest approach, (N,) -> (N,).
+PerDensity = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -54,59 +59,24 @@ class DrawnPeaks:
 
 
 def draw_peaks(
-    axes: Sequence[AxisData], per_density: Sequence, flyby: Flyby, sources: Sequence[Jet], closest_s: float, seed: int = 0
+    axes: Sequence[AxisData], per_density: Sequence[PerDensity], flyby: Flyby, sources: Sequence[Jet], closest_s: float, seed: int = 0
 ) -> DrawnPeaks:  # fmt: skip
     """Peaks drawn from the posterior.
 
-    ``axes``: every axis that gas turns; ``per_density``: of each, the torque per density at times from closest approach (a
-    callable, (N,) -> (N,)); ``closest_s``: from the telemetry's epoch."""
+    ``axes``: every axis that gas turns; ``per_density``: of each, the torque per density at times from closest approach;
+    ``closest_s``: from the telemetry's epoch."""
     rng = np.random.default_rng(seed)
-    nodes = _nodes()
-    shapes, sizes = _shapes(flyby, tuple(sources))
-    answers = [a.answers(nodes + closest_s) for a in axes]
-    factors = [k(nodes) for k in per_density]
-    local = [_local(a.smooth_torque(), a.time_s) for a in axes]
-    largest = max(
-        float(np.max(s / np.maximum(np.abs(k(a.time_s - closest_s)), 1e-300)))
-        for s, k, a in zip(local, per_density, axes, strict=True)
-    )
-    some = [list(c) for n in range(1, min(len(sources), _MOST) + 1) for c in combinations(range(len(sources)), n)]
-    ways = [(share, hold) for hold in HOLDS_M for share in SHARES] + [(1.0, 0.0)]
-    score = []  # (ways, exponents and leans, widths, choices); the last choice: no jets
-    for share, hold in ways:
-        fits = _regressions(axes, answers, nodes, closest_s, local, flyby, share, hold)
-        score.append(_evidence(fits, factors, shapes, some, largest))
-    log = np.array(score)
+    plume = _Plume(tuple(axes), tuple(per_density), flyby, tuple(sources), closest_s)
+    log = np.array([plume.evidence(way) for way in _WAYS])  # (ways, exponents and leans, widths, subsets and none)
     p = np.exp(log - log.max())
     p /= p.sum()
     drawn = np.stack(np.unravel_index(rng.choice(p.size, _DRAWS, p=p.ravel()), p.shape), axis=1)
-    fine = np.arange(nodes[0], nodes[-1], _FINE_S)
-    tops = []
-    for w in np.unique(drawn[:, 0]):
-        mine = drawn[drawn[:, 0] == w]
-        fits = _regressions(axes, answers, nodes, closest_s, local, flyby, *ways[w])
-        tops.append(
-            _tops(
-                fits,
-                factors,
-                shapes,
-                sizes,
-                [some[i] if i < len(some) else [] for i in mine[:, 3]],
-                mine,
-                largest,
-                flyby,
-                sources,
-                per_density,
-                closest_s,
-                fine,
-                rng,
-            )
-        )
+    tops = [plume.tops(_WAYS[w], drawn[drawn[:, 0] == w, 1:], rng) for w in np.unique(drawn[:, 0])]
     times, heights = np.concatenate(tops).T
-    powers = p[..., :-1].sum(axis=(0, 2, 3)).reshape(len(POWERS), len(LEANS_RAD))
+    jets = p[..., :-1].sum(axis=(0, 2, 3)).reshape(len(POWERS), len(LEANS_RAD))
     return DrawnPeaks(
-        times, heights, float(powers.sum()), {f"{n:g}": float(v) for n, v in zip(POWERS, powers.sum(axis=1), strict=True)},
-        float(powers[:, LEANS_RAD != LEANS_RAD[len(LEANS_RAD) // 2]].sum()),
+        times, heights, float(jets.sum()), {f"{n:g}": float(v) for n, v in zip(POWERS, jets.sum(axis=1), strict=True)},
+        float(np.delete(jets, _UPRIGHT, axis=1).sum()),
     )  # fmt: skip
 
 
@@ -114,23 +84,18 @@ def _nodes() -> np.ndarray:
     return np.arange(_SPAN_S[0], _SPAN_S[1] + _NODE_S / 2, _NODE_S)
 
 
-def _jet(jet: Jet, flyby: Flyby, time_s, n: float, lean: float, width: float) -> np.ndarray:
-    return jet_density(
-        replace(jet, density_kgm3=1.0, width_rad=width, tilt_rad=jet.tilt_rad + lean), flyby, time_s, power=n
-    )
+def _jet(jet: Jet, flyby: Flyby, time_s, form: int, width: float) -> np.ndarray:
+    """Density of a jet of unit K; ``form``: number of exponent and lean."""
+    power, lean = POWERS[form // len(LEANS_RAD)], LEANS_RAD[form % len(LEANS_RAD)]
+    leaning = replace(jet, density_kgm3=1.0, width_rad=width, tilt_rad=jet.tilt_rad + lean)
+    return jet_density(leaning, flyby, time_s, power=power)
 
 
 @lru_cache(maxsize=4)
 def _shapes(flyby: Flyby, sources: tuple[Jet, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Jets of height one at the nodes, (exponents and leans, widths, J, C), and their heights at unit density."""
-    nodes = _nodes()
-    shapes = np.array(
-        [
-            [[_jet(j, flyby, nodes, n, lean, w) for j in sources] for w in WIDTHS_RAD]
-            for n in POWERS
-            for lean in LEANS_RAD
-        ]
-    )
+    nodes, forms = _nodes(), range(len(POWERS) * len(LEANS_RAD))
+    shapes = np.array([[[_jet(j, flyby, nodes, f, w) for j in sources] for w in WIDTHS_RAD] for f in forms])
     sizes = np.maximum(shapes.max(axis=-1), 1e-300)
     return shapes / sizes[..., None], sizes
 
@@ -140,68 +105,8 @@ def _local(torque: np.ndarray, time_s: np.ndarray) -> np.ndarray:
     return np.sqrt(gaussian_filter1d(torque**2, _NEARBY_S / float(np.mean(np.diff(time_s))), mode="nearest"))
 
 
-def _regressions(axes, answers, nodes, closest_s, local, flyby: Flyby, share: float, hold: float) -> list[Regression]:
-    found = []
-    for axis, seen, size in zip(axes, answers, local, strict=True):
-        near = flyby.altitude(axis.time_s - closest_s) < hold
-        found.append(regression(axis, nodes + closest_s, np.where(near, share, 1.0) * size, seen))
-    return found
-
-
-def _evidence(fits: list[Regression], factors, shapes, some, largest: float) -> np.ndarray:
-    """Log of evidence times prior, (exponents and leans, widths, choices and none)."""
-    W = np.concatenate([f.W * k for f, k in zip(fits, factors, strict=True)]) * largest
-    y = np.concatenate([f.y for f in fits])
-    base = sum(f.log_evidence for f in fits)
-    seen = shapes.reshape(-1, shapes.shape[-1]) @ np.asarray(np.linalg.qr(W, mode="r")).T
-    c = shapes @ (W.T @ y)
-    seen = seen.reshape(*shapes.shape[:3], -1)
-    GS = seen @ np.swapaxes(seen, -1, -2)
-    choices = np.log(2 * shapes.shape[1] * len(POWERS) * len(some))
-    lean = np.tile(np.where(LEANS_RAD == LEANS_RAD[len(LEANS_RAD) // 2], 0.0, -np.log(len(LEANS_RAD) - 1)), len(POWERS))
-    log = np.full((*shapes.shape[:2], len(some) + 1), -np.inf)
-    for i, ids in enumerate(some):
-        M = GS[:, :, ids][:, :, :, ids] + np.eye(len(ids))  # heights: half-normal, of the largest density there is
-        k = np.linalg.solve(M, c[:, :, ids, None])[..., 0]
-        value = base + 0.5 * np.sum(c[:, :, ids] * k, axis=-1) - 0.5 * np.linalg.slogdet(M)[1] + len(ids) * np.log(2)
-        log[:, :, i] = np.where((k >= 0).all(axis=-1), value - choices + lean[:, None], -np.inf)
-    log[0, 0, -1] = base
-    return log
-
-
-def _tops(
-    fits, factors, shapes, sizes, chosen, mine, largest, flyby, sources, per_density, closest_s, fine, rng
-) -> np.ndarray:
-    """Time and density of the peak of one curve for every choice drawn. (K, 2)"""
-    W = np.concatenate([f.W * k for f, k in zip(fits, factors, strict=True)]) * largest
-    y = np.concatenate([f.y for f in fits])
-    at_nodes, curves = np.zeros((len(mine), W.shape[1])), np.zeros((len(mine), len(fine)))
-    for row, ids in enumerate(chosen):
-        if not ids:
-            continue
-        a, k = mine[row, 1:3]
-        heights = _positive(W @ shapes[a, k, ids].T, y, rng)
-        at_nodes[row] = largest * heights @ shapes[a, k, ids]
-        n, lean = POWERS[a // len(LEANS_RAD)], LEANS_RAD[a % len(LEANS_RAD)]
-        for i, h in zip(ids, heights, strict=True):
-            curves[row] += largest * h / sizes[a, k, i] * _jet(sources[i], flyby, fine, n, lean, WIDTHS_RAD[k])
-    extra, weight = np.zeros_like(curves), 0.0
-    for f, k, of in zip(fits, factors, per_density, strict=True):
-        t = f.axis.time_s - closest_s
-        K = of(t)
-        rest = f.remainders(at_nodes * k, rng)
-        # a remainder of one axis is a density as far as that axis tells one: weighed by what it knows
-        known = float(np.sum((f.W * k) ** 2))
-        part = np.array([np.interp(fine, t, r / np.where(K == 0, np.inf, K)) for r in rest])
-        extra, weight = extra + known * part, weight + known
-    curves = curves + extra / weight
-    near = flyby.altitude(fine) <= FARTHEST_M
-    top = np.argmax(np.where(near, curves, -np.inf), axis=1)
-    return np.column_stack([fine[top], curves[np.arange(len(curves)), top]])
-
-
 def _positive(X: np.ndarray, y: np.ndarray, rng) -> np.ndarray:
-    """Heights under their normal posterior, drawn again while one is negative; then the most probable ones."""
+    """Heights under their normal posterior, drawn again while one is negative; in the end the most probable ones."""
     precision = X.T @ X + np.eye(X.shape[1])
     mean = np.linalg.solve(precision, X.T @ y)
     root = np.linalg.cholesky(np.linalg.inv(precision))
@@ -210,3 +115,81 @@ def _positive(X: np.ndarray, y: np.ndarray, rng) -> np.ndarray:
         if (drawn >= 0).all():
             return drawn
     return np.maximum(mean, 0.0)
+
+
+class _Plume:
+    """A flyby's telemetry, and every choice of jets for it.  Heights of jets are in units of the largest density there is."""
+
+    def __init__(self, axes: tuple[AxisData, ...], per_density: tuple[PerDensity, ...], flyby: Flyby, sources: tuple[Jet, ...], closest_s: float):  # fmt: skip
+        self.axes, self.per_density, self.flyby, self.sources, self.closest_s = (
+            axes,
+            per_density,
+            flyby,
+            sources,
+            closest_s,
+        )
+        self.nodes = _nodes()
+        self.shapes, self.sizes = _shapes(flyby, sources)
+        self.factors = [k(self.nodes) for k in per_density]
+        self.answers = [a.answers(self.nodes + closest_s) for a in axes]
+        self.local = [_local(a.smooth_torque(), a.time_s) for a in axes]
+        self.largest = max(
+            float(np.max(np.interp(self.nodes + closest_s, a.time_s, size)[k != 0] / np.abs(k[k != 0])))
+            for a, size, k in zip(axes, self.local, self.factors, strict=True)
+        )
+        most = range(1, min(len(sources), _MOST) + 1)
+        self.subsets = [list(c) for n in most for c in combinations(range(len(sources)), n)]
+
+    def regressions(self, way: tuple[float, float]) -> tuple[list[Regression], np.ndarray, np.ndarray]:
+        """Of every axis under the remainder of a way; y (R,) and W (R, C) of all for the density in units of the largest."""
+        share, holds_m = way
+        fits = []
+        for axis, answers, size in zip(self.axes, self.answers, self.local, strict=True):
+            near = self.flyby.altitude(axis.time_s - self.closest_s) < holds_m
+            fits.append(regression(axis, self.nodes + self.closest_s, np.where(near, share, 1.0) * size, answers))
+        W = np.concatenate([f.W * k for f, k in zip(fits, self.factors, strict=True)])
+        return fits, np.concatenate([f.y for f in fits]), W * self.largest
+
+    def evidence(self, way: tuple[float, float]) -> np.ndarray:
+        """Log of evidence times prior of every choice, (exponents and leans, widths, subsets and none)."""
+        fits, y, W = self.regressions(way)
+        base = sum(f.log_evidence for f in fits)
+        seen = self.shapes.reshape(-1, len(self.nodes)) @ np.asarray(np.linalg.qr(W, mode="r")).T
+        seen = seen.reshape(*self.shapes.shape[:3], -1)
+        G, b = seen @ np.swapaxes(seen, -1, -2), self.shapes @ (W.T @ y)
+        lean = np.full(len(LEANS_RAD), -np.log(2 * (len(LEANS_RAD) - 1)))
+        lean[_UPRIGHT] = -np.log(2)
+        prior = np.tile(lean, len(POWERS))[:, None] - np.log(len(POWERS) * len(WIDTHS_RAD) * len(self.subsets))
+        log = np.full((*self.shapes.shape[:2], len(self.subsets) + 1), -np.inf)
+        for i, ids in enumerate(self.subsets):
+            M = G[:, :, ids][:, :, :, ids] + np.eye(len(ids))  # a height's prior: half of a normal one, of sigma 1
+            k = np.linalg.solve(M, b[:, :, ids, None])[..., 0]
+            value = 0.5 * np.sum(b[:, :, ids] * k, axis=-1) - 0.5 * np.linalg.slogdet(M)[1] + len(ids) * np.log(2)
+            log[:, :, i] = np.where((k >= 0).all(axis=-1), base + value + prior, -np.inf)
+        log[0, 0, -1] = base
+        return log
+
+    def tops(self, way: tuple[float, float], chosen: np.ndarray, rng) -> np.ndarray:
+        """Time and density of the peak of one curve drawn for each choice (K, 3). (K, 2)"""
+        fits, y, W = self.regressions(way)
+        fine = np.arange(self.nodes[0], self.nodes[-1], _FINE_S)  # a cusp lies between nodes
+        jets, curves = np.zeros((len(chosen), len(self.nodes))), np.zeros((len(chosen), len(fine)))
+        for row, (form, width, subset) in enumerate(chosen):
+            if subset == len(self.subsets):
+                continue
+            ids = self.subsets[subset]
+            heights = _positive(W @ self.shapes[form, width, ids].T, y, rng)
+            jets[row] = self.largest * heights @ self.shapes[form, width, ids]
+            for i, h in zip(ids, heights, strict=True):
+                unit = _jet(self.sources[i], self.flyby, fine, form, WIDTHS_RAD[width])
+                curves[row] += self.largest * h / self.sizes[form, width, i] * unit
+        rests, weights = [], []
+        for f, k, per_density in zip(fits, self.factors, self.per_density, strict=True):
+            t = f.axis.time_s - self.closest_s
+            K = per_density(t)
+            rest = f.remainders(jets * k, rng) / np.where(K == 0, np.inf, K)
+            rests.append([np.interp(fine, t, r) for r in rest])
+            weights.append(float(np.sum((f.W * k) ** 2)))  # a remainder tells of the density what its axis does
+        curves += np.average(rests, axis=0, weights=weights)
+        top = np.argmax(np.where(self.flyby.altitude(fine) <= FARTHEST_M, curves, -np.inf), axis=1)
+        return np.column_stack([fine[top], curves[np.arange(len(curves)), top]])
