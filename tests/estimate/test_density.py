@@ -1,5 +1,6 @@
 """Density of a flyby: laws on what is made of a torque, recovery on simulated flybys E3, and what it refuses."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -8,7 +9,10 @@ import pytest
 from asflown.craft.load import load_craft
 from asflown.dynamics.environment import gravity_gradient
 from asflown.dynamics.flyby import flyby_called
+from asflown.dynamics.plume import as_passed, plume_density, published_jets
 from asflown.estimate.density import density
+from asflown.estimate.jets import jets
+from asflown.estimate.whitened import hats, regression
 from asflown.kit.errors import BadInput
 from asflown.sim.fly import fly
 from asflown.telemetry.tables import write_table
@@ -27,6 +31,11 @@ def flown(seed=3, exponent=2, **more):
     return fly("quiet", craft=CASSINI, epoch=EPOCH, duration="480 s", seed=seed, torques=[plume], **more)
 
 
+@cache
+def fused():
+    return density(flown().telemetry, CASSINI, "E3", CLOSEST)
+
+
 def true_density(f, r):
     return -np.interp(r.time_s + CLOSEST_S, f.truth.time_s, f.truth.torque_Nm[:, 2]) / SCALE
 
@@ -38,8 +47,17 @@ def test_published_errors_add_up():
     """004 section VI: 5.9 % of what is known of the drag, 5 % of the torque, 7.73 % together."""
     r = density(flown().telemetry, CASSINI, "E3", CLOSEST, variant="printed")
     assert r.scale == 0.059 and r.peak.sigma_kgm3 / r.peak.density_kgm3 == pytest.approx(0.0773, abs=5e-5)
-    assert r.torque_per_density == -3.422e9 and (r.method, r.variant) == ("transfer", "printed")
+    assert r.torque_per_density == (-3.422e9,) and (r.method, r.variant) == ("transfer", "printed")
     assert r.gravity_gradient_Nm is None and r.peak.sigma_time_s is None
+
+
+@pytest.mark.parametrize(("order", "low"), [(6, 0.27), (12, 0.07)])
+def test_published_polynomials_are_low(order, low):
+    """004 eqs 6 to 8 and 17, 18 over -20 to +130 s, noise-free: a peak of -0.0162 and -0.0206 for -0.0222 N m (recomputed)."""
+    f = flown(exponent=1, noise="none")
+    arc = f.telemetry.between(CLOSEST_S - 20, CLOSEST_S + 130)
+    r = density(arc, CASSINI, "E3", CLOSEST, method="polynomial", order=order, variant="printed")
+    assert 1 + r.peak.density_kgm3 * SCALE / f.truth.peaks[0][1] == pytest.approx(low, abs=0.015)
 
 
 # ---- laws ---------------------------------------------------------------------------------------------------
@@ -47,7 +65,7 @@ def test_published_errors_add_up():
 
 def test_law_density_is_torque_over_drag_and_both_errors_stay_apart():
     r = density(flown().telemetry, CASSINI, "E3", CLOSEST, method="momentum")
-    assert r.torque_per_density == pytest.approx(-SCALE)
+    assert r.torque_per_density == pytest.approx((-SCALE,))
     assert r.density_kgm3 == pytest.approx(-r.torque_Nm / SCALE)
     doubled = density(flown().telemetry, CASSINI, "E3", CLOSEST_S, method="momentum", area_m2=2 * 18.401)
     assert doubled.peak.density_kgm3 == pytest.approx(r.peak.density_kgm3 / 2)
@@ -63,7 +81,7 @@ def test_law_gravity_gradient_is_taken_off_where_the_attitude_is_told():
     I_B = CASSINI.at(f.telemetry.epoch_ns).inertia_kgm2
     expected = gravity_gradient(I_B, E3.position(told.time_s, UP, FLIGHT), E3.moon.mu_m3_s2)[:, 2]
     assert told.gravity_gradient_Nm == pytest.approx(expected)
-    assert (bounded.density_kgm3 - told.density_kgm3) * told.torque_per_density == pytest.approx(expected, abs=1e-15)
+    assert (bounded.density_kgm3 - told.density_kgm3) * told.torque_per_density[0] == pytest.approx(expected, abs=1e-15)
     assert np.abs(expected).max() > 2e-4  # N m
     # what is left out is then sunlight, generators and magnetism only
     assert (told.bound_kgm3 * SCALE).max() == pytest.approx(2e-6 + 1.83e-6 + 0.4928e-6, rel=1e-3)
@@ -75,7 +93,96 @@ def test_law_the_arms_sign_is_that_of_the_largest_excursion():
     plume = {"shape": "plume", "closest_approach": f"{CLOSEST_S} s", "sign": 1}
     f = fly("quiet", craft=CASSINI, epoch=EPOCH, duration="480 s", seed=3, torques=[plume])
     r = density(f.telemetry, CASSINI, "E3", CLOSEST, method="momentum")
-    assert r.torque_per_density > 0 and r.peak.density_kgm3 > 5e-12
+    assert r.torque_per_density[0] > 0 and r.peak.density_kgm3 > 5e-12
+
+
+def test_law_a_drag_table_of_constant_values_is_the_crafts_own_drag(tmp_path):
+    table = tmp_path / "drag.csv"
+    table.write_text("# E3\ntime [s],area [m2],arm_z [m]\n-300,18.401,-0.853\n300,18.401,-0.853\n")
+    a = density(flown().telemetry, CASSINI, "E3", CLOSEST, method="momentum")
+    b = density(flown().telemetry, CASSINI, "E3", CLOSEST, method="momentum", drag_table=table)
+    assert b.density_kgm3 == pytest.approx(a.density_kgm3) and b.sign == 1 and b.axis == "z"
+    faster = table.read_text().replace("area [m2]", "speed [km/s],area [m2]").replace(",18.401", ",28.82,18.401")
+    table.write_text(faster)
+    c = density(flown().telemetry, CASSINI, "E3", CLOSEST, method="momentum", drag_table=table)
+    assert c.density_kgm3 == pytest.approx(a.density_kgm3 / 4)
+
+
+def test_law_whitened_answers_add_up_to_those_of_the_torque():
+    """Taking a torque off the data and off the regression is one thing: residuals and evidence agree."""
+    a = fused().evidence["z"]
+    nodes = np.arange(-20.0, 60.0, 2.0) + CLOSEST_S
+    T = -0.01 * np.exp(-(((nodes - 210) / 12) ** 2))
+    size = 0.1 * a.levels.torque_Nm
+    fit, less = regression(a, nodes, size), regression(a.without(hats(a.time_s, nodes) @ T), nodes, size)
+    assert less.y == pytest.approx(fit.y - fit.W @ T, abs=1e-6)
+    assert less.log_evidence - fit.log_evidence == pytest.approx(0.5 * (fit.y @ fit.y - less.y @ less.y), rel=1e-9)
+    early, _ = fit.until(CLOSEST_S)
+    assert len(early) < len(fit.y) and np.isfinite(fit.at_s[fit.at_s > -np.inf]).all()
+
+
+def oblique(tmp_path, share_y=0.6):
+    """A plume that turns the craft about y by 0.6 of what it does about z, and what the drag table says of it."""
+    t = np.arange(0, 480.25, 0.25)
+    T = -SCALE * plume_density([as_passed(j, E3) for j in published_jets()], E3, t - CLOSEST_S, power=2)
+    torque, table = tmp_path / "torque.csv", tmp_path / "drag.csv"
+    torque.write_text(
+        "time [s],y [N m],z [N m]\n" + "".join(f"{a},{share_y * b},{b}\n" for a, b in zip(t, T, strict=True))
+    )
+    table.write_text("time [s],area [m2],arm_y [m],arm_z [m]\n-600,18.401,-0.5118,-0.853\n600,18.401,-0.5118,-0.853\n")
+    return fly(
+        "quiet", craft=CASSINI, epoch=EPOCH, duration="480 s", seed=3, torques=[{"shape": "table", "file": str(torque)}]
+    ), table
+
+
+def test_law_several_axes_tell_one_density_better_and_whether_they_agree(tmp_path):
+    f, table = oblique(tmp_path)
+    how = {"method": "momentum", "drag_table": table}
+    one, both = (density(f.telemetry, CASSINI, "E3", CLOSEST, axis=a, **how) for a in ("z", None))
+    assert (one.axis, both.axis) == ("z", "yz") and one.agreement is None and both.torque_Nm.shape[1] == 2
+    s = both.sigma_shape_kgm3[200] / one.sigma_shape_kgm3[200]
+    assert 0.7 < s < 0.95  # 1 / sqrt(1 + 0.36) = 0.86 for axes of one noise
+    assert both.agreement.p > 1e-3
+    f, table = oblique(tmp_path, share_y=0.3)
+    wrong = density(f.telemetry, CASSINI, "E3", CLOSEST, **how)
+    assert wrong.agreement.p < 1e-4 and any("does not explain the torque about y, z" in d for d in wrong.doubts)
+
+
+@pytest.mark.slow
+def test_recovery_of_the_peak_from_two_axes(tmp_path):
+    f, table = oblique(tmp_path)
+    r = density(f.telemetry, CASSINI, "E3", CLOSEST, drag_table=table)
+    assert r.peak.density_kgm3 == pytest.approx(6.95e-12, rel=0.05) and r.peak.time_s == pytest.approx(33.1, abs=1.5)
+    j = jets(
+        f.telemetry.between(0, CLOSEST_S + 98),
+        CASSINI,
+        "E3",
+        CLOSEST,
+        drag_table=table,
+        widths="common",
+        fit="forward",
+        power=2,
+    )
+    assert j.peak[0] == pytest.approx(6.95e-12, rel=0.03) and j.unit == "sigma"
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    (None, "cannot be read"),
+    ("time,area\n0,1\n1,1\n", "header"),
+    ("time [s],area [m2],arm_w [m]\n0,1,1\n1,1,1\n", "header"),
+    ("time [s],area [m2],arm_z [m]\n0,1,1\n", "two rows"),
+    ("time [s],area [m2],arm_z [m]\n0,1,1\n1,x,1\n", "line 3"),
+    ("time [s],area [m2],arm_z [m]\n0,1,1\n0,1,1\n", "do not increase"),
+    ("time [s],area [m2],arm_z [m]\n0,1,1\n1,-1,1\n", "not positive"),
+    ("time [s],area [m2],arm_z [m]\n0,1,0\n1,1,0\n", "no arm about any axis"),
+])  # fmt: skip
+def test_a_drag_table_that_is_not_one(text, words, tmp_path):
+    table = tmp_path / "drag.csv"
+    if text is not None:
+        table.write_text(text)
+    with pytest.raises(BadInput, match=words) as e:
+        density(flown().telemetry, CASSINI, "E3", CLOSEST, method="momentum", drag_table=table)
+    assert "drag.csv" in str(e.value)
 
 
 # ---- recovery -----------------------------------------------------------------------------------------------
@@ -94,50 +201,85 @@ def peaks_off(seeds, exponent):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("exponent", "late_s"), [(1, -3.0), (2, -0.4)])
-def test_recovery_of_the_peak(exponent, late_s):
-    """A cusp (exponent 1) is rounded on its steeper side: its time comes out early, and the result says so."""
-    off, pulls, late, _ = peaks_off(range(5), exponent)
-    assert np.abs(off.mean()) < 0.035 and np.abs(off).max() < 0.10
-    assert np.abs(pulls).max() < 2.5
-    assert late.mean() == pytest.approx(late_s, abs=2.2)  # s: 3 sigma of five with 1.6
+@pytest.mark.parametrize("exponent", [1, 2])
+def test_recovery_of_the_peak(exponent):
+    """Within 1 s also at a cusp (exponent 1), which smoothing moves by 3."""
+    off, pulls, late, time_pulls = peaks_off(range(5), exponent)
+    assert np.abs(off).max() < 0.08 and np.abs(late).max() < 3.0
+    assert np.abs(late.mean()) < 1.0 and np.abs(off.mean()) < 0.03
+    assert np.abs(pulls).max() < 3.5 and np.abs(time_pulls).max() < 3.5
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("exponent", "late_s"), [(1, -3.0), (2, -0.4)])
-def test_recovery_of_the_peak_over_many_flybys(exponent, late_s):
-    off, pulls, late, time_pulls = peaks_off(range(100, 200), exponent)
+@pytest.mark.parametrize("exponent", [1, 2])
+def test_recovery_of_the_peak_over_many_flybys(exponent):
+    off, pulls, late, time_pulls = peaks_off(range(100, 160), exponent)
     assert np.abs(off.mean()) < 0.03
-    assert np.mean(np.abs(pulls) < 1) > 0.60
-    assert late.mean() == pytest.approx(late_s, abs=0.8)
-    assert np.sqrt(np.mean(time_pulls**2)) < 1.7
+    assert np.abs(late.mean()) < 1.0  # s
+    for p in (pulls, time_pulls):  # 68 % are wanted; 3 sigma of 60 flights are 18 %
+        assert np.mean(np.abs(p) < 1) > 0.50
+        assert np.sqrt(np.mean(p**2)) < 1.6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("power", [1, 1.5])
+def test_recovery_of_the_peak_where_the_sources_are_not_those_published(power, tmp_path):
+    """Cairo and Alexandria lean by 5 degrees one way and Damascus the other: no choice of the estimator's has this."""
+    t = np.arange(0, 480.25, 0.25)
+    off = np.radians([5, 5, -5])
+    moved = [replace(as_passed(j, E3), tilt_rad=j.tilt_rad + d) for j, d in zip(published_jets(), off, strict=True)]
+    rho = plume_density(moved, E3, t - CLOSEST_S, power=power)
+    (tmp_path / "t.csv").write_text(
+        "time [s],z [N m]\n" + "".join(f"{a},{-SCALE * b}\n" for a, b in zip(t, rho, strict=True))
+    )
+    late, pulls = [], []
+    for seed in range(6):
+        f = fly("quiet", craft=CASSINI, epoch=EPOCH, duration="480 s", seed=seed, torques=[{"shape": "table", "file": str(tmp_path / "t.csv")}])  # fmt: skip
+        p = density(f.telemetry, CASSINI, "E3", CLOSEST).peak
+        late.append(p.time_s + CLOSEST_S - t[np.argmax(rho)])
+        pulls.append((p.density_kgm3 - rho.max()) / p.sigma_shape_kgm3)
+    assert np.abs(np.mean(late)) < 1.5 and np.abs(late).max() < 4.0
+    assert np.sqrt(np.mean(np.square(pulls))) < 3.0
 
 
 def test_recovery_along_the_flyby():
-    f = flown()
-    r = density(f.telemetry, CASSINI, "E3", CLOSEST)
+    f, r = flown(), fused()
     off = r.density_kgm3 - true_density(f, r)
     assert np.sqrt(np.mean(off**2)) < 0.02 * r.peak.density_kgm3
     assert np.std(off / r.sigma_shape_kgm3) < 2.0
-    assert r.noticed_s[0] == pytest.approx(20, abs=8) and r.noticed_s[1] > 90
+    assert r.noticed.first_s == pytest.approx(20, abs=8) and r.noticed.last_s > 90
+    assert r.noticed.published_s == (8, 112) and "99.5 %" in r.noticed.criterion
 
 
 def test_no_gas_is_said_to_be_none():
     f = fly("quiet", craft=CASSINI, epoch=EPOCH, duration="480 s", seed=1)
     r = density(f.telemetry, CASSINI, "E3", CLOSEST, method="momentum")
-    assert r.noticed_s is None and any("no gas is seen" in d for d in r.doubts)
+    assert r.noticed is None and any("no gas is seen" in d for d in r.doubts)
 
 
 # ---- what it says and refuses -------------------------------------------------------------------------------
 
 
 def test_peaks_published_for_the_same_flyby_stand_beside():
-    r = density(flown().telemetry, CASSINI, "E3", CLOSEST)
+    r = fused()
     aacs, inms = r.beside
     assert inms.ratio == pytest.approx(r.peak.density_kgm3 / 1.8e-12)
     both = np.hypot(r.peak.sigma_kgm3 / r.peak.density_kgm3, 0.2 / 1.8)
     assert inms.sigma_ratio == pytest.approx(inms.ratio * both) and aacs.sigma_ratio is None
     assert inms.later_s == r.peak.time_s - 50
+
+
+def test_where_the_geometry_is_not_known_the_peak_is_that_of_the_curve():
+    with_it = fused()
+    without = density(flown().telemetry, CASSINI, "E5", CLOSEST, area_m2=18.4, arm_m=0.85)
+    assert (with_it.peak.way, without.peak.way) == ("of jets and a remainder", "of the curve")
+    assert (
+        without.peak.density_kgm3 == without.density_kgm3.max()
+        and without.peak.sigma_time_s > with_it.peak.sigma_time_s
+    )
+    assert any("smoothed curve" in d for d in without.doubts) and not any("smoothed curve" in d for d in with_it.doubts)
+    found = with_it.settings["peak"]
+    assert found["jets_probability"] > 0.9 and found["power_probability"]["2"] > found["power_probability"]["1"]
 
 
 def test_doubts():
@@ -203,6 +345,11 @@ def test_the_verb(tmp_path):
     assert len(record["time_s"]) == len(record["density_kgm3"]) == len(record["altitude_m"])
     assert record["time_s"][0] == pytest.approx(-CLOSEST_S, abs=4) and len(record["published"]) == 2
     assert (tmp_path / "d.svg").read_text().startswith("<?xml")
+    table = tmp_path / "drag.csv"
+    table.write_text("time [s],speed [km/s],area [m2],arm_z [m]\n-300,14.41,18.401,-0.853\n300,14.41,18.401,-0.853\n")
+    tabled = run(*words, "--drag-table", table, "--json").record
+    assert tabled["peak"]["density_kgm3"] == pytest.approx(record["peak"]["density_kgm3"])
+    assert any(i["file"] == str(table) for i in tabled["provenance"]["inputs"])
     text = run(*words, "--velocity", "0,1,0", "--up", "1,0,0")
     assert text.code == 0 and "gravity gradient taken off" in text.out and "INMS" in text.out
 

@@ -11,14 +11,17 @@ from .flyby_options import (
     ARM,
     AXIS,
     CLOSEST,
+    DRAG_TABLE,
     FLYBY,
     KERNELS,
     METHOD,
+    SOURCE,
     TRAJECTORY,
     UP,
     VELOCITY,
     drag_from,
     flyby_from,
+    sources_from,
 )
 from .options import (
     CHANNELS,
@@ -49,6 +52,8 @@ def density(
     ),
     area: str = AREA,
     arm: str = ARM,
+    drag_table: Path = DRAG_TABLE,
+    source: list[str] = SOURCE,
     velocity: str = VELOCITY,
     up: str = UP,
     trajectory: Path = TRAJECTORY,
@@ -72,8 +77,10 @@ def density(
     ship = craft_from(craft, inertia, None)
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
     path, of_path = flyby_from(flyby, closest_approach, trajectory, kernels, telemetry, ship)
-    drag = drag_from(axis, method, area, arm, velocity, up)
-    result = density_of(telemetry, ship, path, closest_approach, variant=variant, **drag)
+    drag = drag_from(axis, method, area, arm, velocity, up, drag_table)
+    result = density_of(
+        telemetry, ship, path, closest_approach, variant=variant, sources=sources_from(source, path), **drag
+    )
     if plot is not None:
         from asflown.plots.density import save_density_figure
 
@@ -87,10 +94,11 @@ def density(
             say(f"wrote {path}")
     if json:
         options = {"craft": craft, "flyby": result.flyby.name, "closest_approach": closest_approach, "axis": result.axis,
-                   "method": result.method, "variant": variant, "area": area, "arm": arm, "velocity": velocity, "up": up,
-                   "trajectory": trajectory, "kernels": kernels, "start": start, "stop": stop, "inertia": inertia}  # fmt: skip
+                   "method": result.method, "variant": variant, "area": area, "arm": arm, "drag_table": drag_table, "source": source,
+                   "velocity": velocity, "up": up, "trajectory": trajectory, "kernels": kernels, "start": start, "stop": stop,
+                   "inertia": inertia}  # fmt: skip
         record = {"command": "density"} | result.record()
-        print_json(record | {"provenance": provenance(inputs | of_path | hashes(craft), options)})
+        print_json(record | {"provenance": provenance(inputs | of_path | hashes(craft, drag_table), options)})
         return
     print(result)
     print_doubts(result.doubts)

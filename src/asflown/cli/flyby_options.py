@@ -16,6 +16,12 @@ METHOD = typer.Option(
 )
 AREA = typer.Option(None, "--area", help='Projected area, as in "18.4 m2"; the craft\'s unless given.')
 ARM = typer.Option(None, "--arm", help='Moment arm, as in "0.85 m"; the craft\'s unless given.')
+DRAG_TABLE = typer.Option(
+    None, "--drag-table", help="CSV of time, speed, area and arm vector along the flyby, in place of the craft's."
+)
+SOURCE = typer.Option(
+    None, "--source", help='A jet\'s source, repeated for more, in place of the published: "NAME=SOUTH LATITUDE,WEST LONGITUDE" or "NAME=TILT,OFFSET" (deg, km).',
+)  # fmt: skip
 VELOCITY = typer.Option(
     None, "--velocity", help='Direction of flight "x,y,z" in body axes; with --up takes the gravity gradient off.'
 )
@@ -64,7 +70,7 @@ def flyby_from(name: str, closest: str, trajectory, kernels, telemetry, craft):
     return path, {source: table.sha256}
 
 
-def drag_from(axis, method, area, arm, velocity, up) -> dict:
+def drag_from(axis, method, area, arm, velocity, up, drag_table) -> dict:
     """What these options say, as ``estimate.density.density`` takes it."""
     from asflown.kit.quantities import plain_numbers, quantity
 
@@ -73,6 +79,35 @@ def drag_from(axis, method, area, arm, velocity, up) -> dict:
         "method": method,
         "area_m2": None if area is None else quantity(area, "m2"),
         "arm_m": None if arm is None else quantity(arm, "m"),
+        "drag_table": drag_table,
         "velocity_B": None if velocity is None else plain_numbers(velocity, 3, "--velocity"),
         "up_B": None if up is None else plain_numbers(up, 3, "--up"),
     }
+
+
+def sources_from(texts: list[str] | None, flyby):
+    """The jets that --source describes, as the flyby passes them; None where there are none.
+
+    The second number's unit says which of the two forms it is.  Raises BadInput for one that cannot be read."""
+    if not texts:
+        return None
+    from asflown.dynamics.plume import Jet, as_passed
+    from asflown.kit.errors import BadInput
+    from asflown.kit.quantities import quantity
+
+    found = []
+    for text in texts:
+        name, _, place = text.partition("=")
+        parts = [p.strip() for p in place.split(",")]
+        if not name.strip() or len(parts) != 2:
+            raise BadInput(
+                f"--source {text!r} is not understood",
+                remedy='Write it as in "Baghdad=81 deg,229 deg" or "X=5 deg,3 km".',
+            )
+        first, angle = quantity(parts[0], "rad"), parts[1].endswith(("deg", "rad"))
+        second = quantity(parts[1], "rad" if angle else "m")
+        if angle:
+            found.append(as_passed(Jet(name.strip(), 1.0, 0.3, 0.0, 0.0, first, second), flyby))
+        else:
+            found.append(Jet(name.strip(), 1.0, 0.3, first, second, float("nan"), float("nan")))
+    return tuple(found)

@@ -11,14 +11,17 @@ from .flyby_options import (
     ARM,
     AXIS,
     CLOSEST,
+    DRAG_TABLE,
     FLYBY,
     KERNELS,
     METHOD,
+    SOURCE,
     TRAJECTORY,
     UP,
     VELOCITY,
     drag_from,
     flyby_from,
+    sources_from,
 )
 from .options import (
     CHANNELS,
@@ -46,10 +49,15 @@ def jets(
     method: str = METHOD,
     sources: str = typer.Option(None, "--sources", help='Which of "Alexandria,Cairo,Damascus"; all unless given.'),
     widths: str = typer.Option("own", "--widths", help="Each jet its own, or one common."),
+    fit: str = typer.Option(
+        "momentum", "--fit", help="To momentum; forward: through the loop to all telemetry; printed: 004's simplex."
+    ),
     power: float = typer.Option(1.0, "--power", help="n of exp(-(angle/width)^n): 1 as 004 eq 26 stands, 2 as eq 24."),
     angle: str = typer.Option("plane", "--angle", help="From a jet's axis: in the flyby's plane, or in space."),
     area: str = AREA,
     arm: str = ARM,
+    drag_table: Path = DRAG_TABLE,
+    source: list[str] = SOURCE,
     velocity: str = VELOCITY,
     up: str = UP,
     trajectory: Path = TRAJECTORY,
@@ -63,7 +71,7 @@ def jets(
     plot_dir: Path = PLOT_DIR,
     json: bool = JSON,
 ) -> None:
-    """Densities and widths of a plume's jets, from the momentum they gave a craft; what the telemetry does not tell is said."""
+    """Densities and widths of a plume's jets, from what they did to a craft; what the telemetry does not tell is said."""
     from asflown.estimate.jets import jets as fitted_jets
     from asflown.kit.files import check_folder
 
@@ -73,11 +81,12 @@ def jets(
     ship = craft_from(craft, inertia, None)
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
     path, of_path = flyby_from(flyby, closest_approach, trajectory, kernels, telemetry, ship)
-    drag = drag_from(axis, method, area, arm, velocity, up)
-    names = None if sources is None else [n.strip().capitalize() for n in sources.split(",")]
+    drag = drag_from(axis, method, area, arm, velocity, up, drag_table)
+    names = None if sources is None else [n.strip() for n in sources.split(",")]
     result = fitted_jets(
-        telemetry, ship, path, closest_approach, names=names, widths=widths, power=power, angle=angle, **drag
-    )
+        telemetry, ship, path, closest_approach, names=names, sources=sources_from(source, path), widths=widths, fit=fit,
+        power=power, angle=angle, **drag,
+    )  # fmt: skip
     if plot is not None:
         from asflown.plots.density import save_jets_figure
 
@@ -91,10 +100,11 @@ def jets(
             say(f"wrote {path}")
     if json:
         options = {"craft": craft, "flyby": result.density.flyby.name, "closest_approach": closest_approach, "axis": axis, "method": method,
-                   "sources": sources, "widths": widths, "power": power, "angle": angle, "area": area, "arm": arm, "velocity": velocity,
-                   "up": up, "trajectory": trajectory, "kernels": kernels, "start": start, "stop": stop, "inertia": inertia}  # fmt: skip
+                   "sources": sources, "widths": widths, "fit": fit, "power": power, "angle": angle, "area": area, "arm": arm,
+                   "drag_table": drag_table, "source": source, "velocity": velocity, "up": up, "trajectory": trajectory,
+                   "kernels": kernels, "start": start, "stop": stop, "inertia": inertia}  # fmt: skip
         record = {"command": "jets"} | result.record()
-        print_json(record | {"provenance": provenance(inputs | of_path | hashes(craft), options)})
+        print_json(record | {"provenance": provenance(inputs | of_path | hashes(craft, drag_table), options)})
         return
     print(result)
     print_doubts(result.doubts)

@@ -57,7 +57,7 @@ class AtmosphereFit:
 
 
 def fit_atmosphere(g: Gained, flyby: Flyby, closest_s: float, per_density, gravity=None) -> AtmosphereFit:
-    """``closest_s``: of closest approach, from the epoch.  ``per_density``: N m per kg/m3, about the axis and with its sign.
+    """``closest_s``: of closest approach, from the epoch.  ``per_density``: of times from closest approach, N m per kg/m3 about the axis, with its sign.
     ``gravity``: instants [s from closest approach] and the gravity gradient's torque [N m], taken off.
 
     Raises BadInput for a body without an atmosphere, and where too few steps are near."""
@@ -72,7 +72,7 @@ def fit_atmosphere(g: Gained, flyby: Flyby, closest_s: float, per_density, gravi
     if len(y) < _FEWEST:
         raise BadInput(f"{len(y)} steps of momentum are too few for an atmosphere", remedy="Take a longer record.")
     above = flyby.altitude(fine) - air.altitude_m
-    swept = (flyby.speed(fine) / flyby.speed_m_s) ** 2  # the torque per density is that of closest approach
+    drag = per_density(fine)
     known = np.column_stack([-g.columns, flyby.moon.small_torques_Nm * np.diff(t)])
     C_known, Cy = g.covariance.solve(known), g.covariance.solve(y[:, None])[:, 0]
     # the unknowns, with their unit variances, are taken out of both sides; what is left has one parameter
@@ -82,9 +82,7 @@ def fit_atmosphere(g: Gained, flyby: Flyby, closest_s: float, per_density, gravi
 
     def profile(heights):
         """Best density for each scale height, its weight, and the misfit."""
-        shape = (swept[..., None] * np.exp(-above[..., None] / heights)).mean(axis=1) * (per_density * np.diff(t))[
-            :, None
-        ]  # (K, heights)
+        shape = (drag[..., None] * np.exp(-above[..., None] / heights)).mean(axis=1) * np.diff(t)[:, None]
         C_shape = g.covariance.solve(shape)
         across = known.T @ C_shape
         ss = np.sum(shape * C_shape, axis=0) - np.einsum("mh,mn,nh->h", across, inverse, across)

@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.stats import chi2
 
 from ..dynamics.flyby import Flyby, PublishedPeak
 from .atmosphere import AtmosphereFit
+from .flyby_drag import DragAlong
+from .whitened import AxisData
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,7 @@ class DensityPeak:
     sigma_kgm3: float | None
     sigma_time_s: float | None
     sigma_altitude_m: float | None
+    way: str = "of the curve"
 
     def record(self) -> dict:
         return dict(vars(self))
@@ -47,11 +51,40 @@ class Beside:
 
 
 @dataclass(frozen=True)
+class Noticed:
+    """First and last instant from closest approach [s] at which the gas stands out, by what criterion; and 004's points P and R."""
+
+    first_s: float
+    last_s: float
+    criterion: str
+    published_s: tuple[float, float] | None
+
+    def record(self) -> dict:
+        return dict(vars(self))
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Chi-square of several axes about one density, and its degrees of freedom, both counted in independent instants."""
+
+    chi_square: float
+    freedom: float
+
+    @property
+    def p(self) -> float:
+        return float(chi2.sf(self.chi_square, self.freedom))
+
+    def record(self) -> dict:
+        return {"chi_square": self.chi_square, "degrees_of_freedom": self.freedom, "p": self.p}
+
+
+@dataclass(frozen=True)
 class DensityResult:
     """Density over time from closest approach, (N,), NaN where nothing is known; negative values are noise, kept.
 
     ``sigma_shape``: random, differs from instant to instant; ``scale``: share by which all of it is off together, one sigma;
-    ``bound``: the most that torques left out (gravity gradient, sunlight, ...) may feign."""
+    ``bound``: the most that torques left out (gravity gradient, sunlight, ...) may feign.  ``axis``: one, or all that were
+    taken together; torques are (N,) then, or (N, n)."""
 
     craft: str
     epoch: str
@@ -67,9 +100,13 @@ class DensityResult:
     bound_kgm3: np.ndarray
     torque_Nm: np.ndarray
     gravity_gradient_Nm: np.ndarray | None  # taken off the torque; None: not modelled
-    torque_per_density: float  # N m / (kg/m3), with the sign of the torque
+    torque_per_density: tuple[float, ...]  # N m / (kg/m3), about each axis, at the peak
     peak: DensityPeak
-    noticed_s: tuple[float, float] | None = None  # first and last instant around the peak above three sigma
+    drag: DragAlong
+    sign: float  # of the arm, where the drag does not know it
+    noticed: Noticed | None = None
+    agreement: Agreement | None = None  # of several axes
+    evidence: dict[str, AxisData] = field(default_factory=dict)  # what the fused torque rests on
     beside: tuple[Beside, ...] = ()
     atmosphere: AtmosphereFit | None = None  # of a body that has one
     doubts: tuple[str, ...] = ()
@@ -85,6 +122,10 @@ class DensityResult:
         if self.sigma_shape_kgm3 is None:
             return None
         return np.hypot(self.sigma_shape_kgm3, self.scale * self.density_kgm3)
+
+    def per_density(self, axis: str, time_s) -> np.ndarray:
+        """Torque per density about an axis at times from closest approach, with its sign. (N,) [N m / (kg/m3)]"""
+        return self.sign * self.drag.at(time_s)[..., "xyz".index(axis)]
 
     def record(self) -> dict:
         """The JSON form, without command and provenance."""
@@ -105,9 +146,12 @@ class DensityResult:
             "bound_left_out_kgm3": self.bound_kgm3,
             "torque_Nm": self.torque_Nm,
             "gravity_gradient_Nm": self.gravity_gradient_Nm,
-            "torque_per_density_m5_s2": self.torque_per_density,
+            "torque_per_density_m5_s2": self.torque_per_density[0]
+            if len(self.axis) == 1
+            else list(self.torque_per_density),
+            "axes_agree": None if self.agreement is None else self.agreement.record(),
             "peak": self.peak.record(),
-            "noticed_s": self.noticed_s,
+            "noticed": None if self.noticed is None else self.noticed.record(),
             "published": [b.record() for b in self.beside],
             "atmosphere": None if self.atmosphere is None else self.atmosphere.record(),
             "settings": self.settings,
@@ -119,12 +163,23 @@ class DensityResult:
         p, scale = self.peak, f"{100 * self.scale:.1f} %"
         lines = [
             f"Density · {self.craft} · {self.flyby.name} · {self.method}, {self.variant}, axis {self.axis} · closest approach {self.closest_approach}",
-            f"  {len(self.time_s)} instants from {self.time_s[0]:+.0f} s to {self.time_s[-1]:+.0f} s · {self.torque_per_density:+.4g} N m per kg/m3",
+            f"  {len(self.time_s)} instants from {self.time_s[0]:+.0f} s to {self.time_s[-1]:+.0f} s · {', '.join(f'{k:+.4g}' for k in self.torque_per_density)} N m per kg/m3",
             f"  peak      {_of(p.density_kgm3, p.sigma_kgm3)} kg/m3, shape {_share(p.sigma_shape_kgm3, p.density_kgm3)}, scale {scale}",
             f"            at {_time(p.time_s, p.sigma_time_s)} s from closest approach, {_time(p.altitude_m / 1e3, _over(p.sigma_altitude_m, 1e3), '')} km high",
         ]
-        if self.noticed_s is not None:
-            lines.append(f"  noticed   from {self.noticed_s[0]:+.0f} s to {self.noticed_s[1]:+.0f} s (3 sigma)")
+        if self.agreement is not None:
+            lines.append(
+                f"  axes      chi-square {self.agreement.chi_square:.1f} for {self.agreement.freedom:.0f} that they agree"
+            )
+        if self.noticed is not None:
+            theirs = (
+                ""
+                if self.noticed.published_s is None
+                else "; published {:+g} to {:+g} s".format(*self.noticed.published_s)
+            )
+            lines.append(
+                f"  noticed   from {self.noticed.first_s:+.0f} s to {self.noticed.last_s:+.0f} s ({self.noticed.criterion}{theirs})"
+            )
         modelled = "taken off" if self.gravity_gradient_Nm is not None else "not modelled"
         at_peak = float(np.interp(p.time_s, self.time_s, self.bound_kgm3))
         lines.append(
@@ -147,7 +202,7 @@ def _of(value: float, sigma: float | None, form: str = ".3g") -> str:
 
 
 def _time(value: float, sigma: float | None, sign: str = "+") -> str:
-    return f"{value:{sign}.0f}" if sigma is None else f"{value:{sign}.0f} ± {sigma:.2g}"
+    return f"{value:{sign}.0f}" if sigma is None else f"{value:{sign}.{1 if sigma < 2 else 0}f} ± {sigma:.2g}"
 
 
 def _share(sigma: float | None, value: float) -> str:

@@ -1,9 +1,10 @@
-"""Jets of a plume fitted to the momentum that they gave a craft (004 section VII, eqs 23, 26 to 28).
+"""Jets of a plume fitted to the telemetry of a craft that flew through them (004 section VII, eqs 23, 26 to 28).
 
-004 fits its six parameters to a reconstructed density, after smoothing and a loop's lag.  Momentum needs neither: what a jet has
-given by an instant is the integral of its torque, wheels and body together hold it, and its noise is that of the sensors.
+004 fits its six parameters to a reconstructed density, after smoothing and a loop's lag (``printed``).  Neither is needed: momentum that
+wheels and body hold is the integral of the torque, sample by sample (``momentum``), and through the loop everything that is
+telemetered answers to it (``forward``).  Both are linear in the density along the flyby (``jets_data``), so
 
-    H(t) = H(0) + T/rho  sum_j K_j int (R_E/r_j)^1.5 exp(-(theta_j/K_theta_j)^n) dt
+    y = A rho,    rho = sum_j K_j (R_E/r_j)^1.5 exp(-(theta_j/K_theta_j)^n)
 
 Likelihood of all widths at once (``jets_surface``), intervals by its profiles, and models of fewer jets and of one common width
 beside, by Schwarz's criterion.  Noise that has a memory counts by how many independent samples it is worth.
@@ -15,48 +16,43 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 from scipy.stats import f as fisher
 
 from ..craft.model import Craft
-from ..dynamics.flyby import Flyby
-from ..dynamics.plume import (
-    FARTHEST_M,
-    Jet,
-    as_passed,
-    jet_density,
-    model_error,
-    plume_density,
-    published_jets,
-    seen_from,
-)
+from ..dynamics.flyby import Flyby, flyby_called
+from ..dynamics.plume import Jet, as_passed, jet_density, model_error, plume_density, published_jets
 from ..kit.errors import BadInput, some_of
 from ..kit.regression import memory
 from ..telemetry.telemetry import Telemetry
 from .density import density
-from .external_samples import samples_of
+from .jets_data import JetData, by_momentum, through_loop
+from .jets_printed import simplex
 from .jets_result import JetsResult, Score, Source
 from .jets_surface import WIDTHS_RAD, Surface
-from .result import AXES
-from .subject import slews, subject_of, thrusters_firing
+from .subject import slews, thrusters_firing
 
-WIDTHS = ("own", "common")
-_STEP_S = 0.25  # of the integral: a jet's cusp is seen
-_BEFORE_S = 120.0  # of quiet before closest approach, to know the momentum that craft and wheels had
+WIDTHS, FITS = ("own", "common"), ("momentum", "forward", "printed")
+#: Combinations of widths grow as 44 to the power of the sources; densities not negative as 2 to it.
+_MOST_OWN, _MOST_COMMON = 3, 8
+#: Widths of the second lattice, over what lies within this much of the least misfit in units of sigma squared: beyond any 95 %.
+_FINER, _REACH = 30, 12.0
 
 
 def jets(
-    telemetry: Telemetry, craft: Craft, flyby: Flyby | str, closest_approach: str | float, *, names=None, widths: str = "own",
-    power: float = 1, angle: str = "plane", **drag,
+    telemetry: Telemetry, craft: Craft, flyby: Flyby | str, closest_approach: str | float, *, names=None, sources=None,
+    widths: str = "own", fit: str = "momentum", power: float = 1, angle: str = "plane", **drag,
 ) -> JetsResult:  # fmt: skip
-    """Densities and widths of the published sources that explain the momentum gained in a flyby.
+    """Densities and widths of sources that explain what a craft went through in a flyby.
 
-    ``names``: sources (Alexandria, Cairo, Damascus; all).  ``widths``: each jet its own, or one common.  ``power`` n, ``angle``:
-    see ``dynamics.plume.jet_density``.  ``drag``: axis, area, arm and directions, and the method of the density set beside, as in ``density``.
+    ``names``: of the published sources (Alexandria, Cairo, Damascus; all).  ``sources``: others in their place, as the flyby
+    passes them.  ``widths``: each jet its own, or one common.  ``fit``: to momentum, through the loop (forward), or as 004
+    (printed).  ``power`` n, ``angle``: see ``dynamics.plume.jet_density``.  ``drag``: axis, area, arm, table and directions, and the method of
+    the density set beside, as in ``density``.
 
-    Raises BadInput where ``density`` does, for unknown sources, in a slew, and where the record ends before the plume."""
-    if widths not in WIDTHS:
-        raise BadInput(f"widths {widths!r} is not known", remedy=f"Choose one of: {some_of(WIDTHS)}.")
+    Raises BadInput where ``density`` does, for unknown or too many sources, in a slew, and where the record ends before the plume."""
+    for what, value, allowed in (("widths", widths, WIDTHS), ("fit", fit, FITS)):
+        if value not in allowed:
+            raise BadInput(f"{what} {value!r} is not known", remedy=f"Choose one of: {some_of(allowed)}.")
     if not 0.5 <= power <= 4:
         raise BadInput(f"a power of {power:g} is no jet's", remedy="004's is 1, or 2 as in its eq 24.")
     if slews(telemetry):
@@ -66,90 +62,102 @@ def jets(
             "thrusters fire in this record, and jets are fitted to the momentum of wheels",
             remedy="Use asflown density, which balances on-times.",
         )
-    met = density(telemetry, craft, flyby, closest_approach, **drag)
-    where = met.flyby
-    every = [as_passed(j, where) for j in published_jets()]
-    wanted = [j.name for j in every] if names is None else list(names)
-    if not wanted or len(set(wanted)) != len(wanted) or not set(wanted) <= {j.name for j in every}:
+    where = flyby_called(flyby) if isinstance(flyby, str) else flyby
+    sources = _wanted(where, names, sources)
+    most = _MOST_OWN if widths == "own" else _MOST_COMMON
+    if len(sources) > most:
         raise BadInput(
-            f"the sources {some_of(wanted)} are not each one of those published",
-            remedy=f"Choose of: {some_of(j.name for j in every)}.",
+            f"{len(sources)} sources with {widths} widths are more than the {most} that can be told apart here",
+            remedy="Use --widths common, or fewer sources.",
         )
-    sources = [j for j in every if j.name in wanted]
-    t, y = _gained(telemetry, craft, met, sources, float(telemetry.seconds(telemetry.moment(closest_approach))))
-    columns = _impulses(sources, where, t, met.torque_per_density, power, angle)
-    surface = Surface(y, columns, widths == "common")
-    sources, left = _fitted(surface, sources, columns, y)
+    met = density(telemetry, craft, where, closest_approach, cusps=False, **drag)
+    closest_s = float(telemetry.seconds(telemetry.moment(closest_approach)))
+    data = (
+        through_loop(met, sources, closest_s)
+        if fit == "forward"
+        else by_momentum(telemetry, craft, met, sources, closest_s)
+    )
+    columns = _columns(sources, where, data, power, angle, np.tile(WIDTHS_RAD, (len(sources), 1)))
+    surface = Surface(data.y, columns, widths == "common")
+    finer = surface.finer(surface.least * (1 + _REACH / len(data.y)), _FINER)
+    surface = Surface(data.y, _columns(sources, where, data, power, angle, finer), widths == "common", finer)
+    doubts: list[str] = []
+    if fit == "printed":
+        sources, doubts = simplex(met, sources, widths == "common", data.last_s, power=power, angle=angle)
+    else:
+        sources = _fitted(surface, sources)
+    left = data.y - data.A @ plume_density(sources, where, data.nodes_s, power=power, angle=angle)
     alike = memory(left)
-    worth = len(y) / alike
+    worth = len(data.y) / alike
     free = len(sources) + (1 if widths == "common" else len(sources)) + 1
     if worth < free + 3:
         raise BadInput(
-            f"{len(y)} samples worth {worth:.0f} independent ones do not carry {free} parameters",
+            f"{len(data.y)} samples worth {worth:.0f} independent ones do not carry {free} parameters",
             remedy="Take a longer record, fewer sources (--sources), or --widths common.",
         )
     # a profile's limit where sigma is unknown too: Fisher's in place of chi squared
     limit = surface.least * (1 + fisher.ppf(0.95, 1, worth - free) / (worth - free))
-    found = tuple(_source(surface, i, jet, limit) for i, jet in enumerate(sources))
-    inside = (met.time_s >= t[0]) & (met.time_s <= t[-1]) & np.isfinite(met.density_kgm3)
+    found = tuple(
+        Source(j, (None, None), (None, None)) if fit == "printed" else _source(surface, i, j, limit)
+        for i, j in enumerate(sources)
+    )
+    inside = (met.time_s >= data.nodes_s[0]) & (met.time_s <= data.last_s) & np.isfinite(met.density_kgm3)
     model = plume_density(sources, where, met.time_s, power=power, angle=angle)
-    scores = _scores(sources, columns, y, worth)
-    doubts = [*_doubts(found, scores, widths, alike), *met.doubts]
+    scores = () if fit == "printed" else _scores(sources, columns, data.y, worth)
+    doubts += [
+        *(() if fit == "printed" else _doubts(found, scores, widths, alike)),
+        *_misfit_doubts(data, left, free),
+        *met.doubts,
+    ]
     return JetsResult(
-        density=met, sources=found, correlation=_correlation(sources, where, t, met.torque_per_density, power, angle, widths),
-        rms_kgm3=model_error(met.time_s[inside], model[inside], met.density_kgm3[inside]), scores=scores, widths=widths,
-        power=power, angle=angle, model_kgm3=model, momentum_rms_Nms=float(np.sqrt(np.mean(left**2))), samples=len(y), worth=worth,
+        density=met, sources=found, correlation=_correlation(sources, where, data, power, angle, widths),
+        rms_kgm3=model_error(met.time_s[inside], model[inside], met.density_kgm3[inside]), scores=scores, widths=widths, fit=fit,
+        power=power, angle=angle, model_kgm3=model, rms=float(np.sqrt(np.mean(left**2))), unit=data.unit, samples=len(data.y), worth=worth,
         doubts=tuple(dict.fromkeys(doubts)),
     )  # fmt: skip
 
 
-def _gained(telemetry: Telemetry, craft: Craft, met, sources, closest_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """Instants from closest approach and momentum about the axis, less what gravity gradient gave, centred. (N,), (N,)"""
-    s = samples_of(subject_of(telemetry, craft))
-    t = telemetry.seconds(s.tai_ns) - closest_s
-    reach = np.max([seen_from(j, met.flyby, t)[0] for j in sources], axis=0)
-    used = (t >= -_BEFORE_S) & (reach <= FARTHEST_M)
-    if used.sum() < 8 or t[used][-1] < 20:
+def _wanted(flyby: Flyby, names, sources) -> list[Jet]:
+    """The sources to fit, as the flyby passes them."""
+    every = [as_passed(j, flyby) for j in published_jets()] if sources is None else list(sources)
+    called = {j.name.casefold(): j.name for j in every}
+    wanted = [j.name for j in every] if names is None else [called.get(n.casefold(), n) for n in names]
+    if not wanted or len(set(wanted)) != len(wanted) or not set(wanted) <= {j.name for j in every}:
         raise BadInput(
-            f"{used.sum()} instants of the plume are in this record: too few for jets",
-            remedy="Take the record from two minutes before closest approach to two minutes after.",
+            f"the sources {some_of(wanted)} are not each one of those {'published' if sources is None else 'given'}",
+            remedy=f"Choose of: {some_of(j.name for j in every)}.",
         )
-    H = s.momentum[:, AXES.index(met.axis)]
-    if met.gravity_gradient_Nm is not None:
-        given = cumulative_trapezoid(met.gravity_gradient_Nm, met.time_s, initial=0)
-        H = H - np.interp(t, met.time_s, given)
-    return t[used], H[used] - H[used].mean()
+    return [j for j in every if j.name in wanted]
 
 
-def _impulses(sources, flyby: Flyby, t, per_density: float, power: float, angle: str) -> np.ndarray:
-    """Momentum that each jet of unit density has given by each instant, for every width, centred. (J, W, N)"""
-    fine = np.arange(t[0], t[-1] + _STEP_S, _STEP_S)
-    columns = np.empty((len(sources), len(WIDTHS_RAD), len(t)))
-    for i, jet in enumerate(sources):
-        for k, width in enumerate(WIDTHS_RAD):
-            rho = jet_density(replace(jet, density_kgm3=1.0, width_rad=width), flyby, fine, power=power, angle=angle)
-            columns[i, k] = per_density * np.interp(t, fine, cumulative_trapezoid(rho, fine, initial=0))
-    return columns - columns.mean(axis=2, keepdims=True)
+def _columns(sources, flyby: Flyby, data: JetData, power: float, angle: str, widths_rad: np.ndarray) -> np.ndarray:
+    """What each jet of unit density gives, for every one of its widths (J, W). (J, W, N)"""
+    shapes = [
+        [
+            jet_density(replace(j, density_kgm3=1.0, width_rad=w), flyby, data.nodes_s, power=power, angle=angle)
+            for w in widths
+        ]
+        for j, widths in zip(sources, widths_rad, strict=True)
+    ]
+    return np.array(shapes) @ data.A.T
 
 
-def _fitted(surface: Surface, sources, columns, y) -> tuple[list[Jet], np.ndarray]:
-    """The best jets of a surface, and what they leave of the momentum."""
-    widths, densities = surface.widths(), surface.densities[surface.best]
-    at = np.searchsorted(WIDTHS_RAD, widths * (1 - 1e-9))
-    left = y - sum(K * columns[i, k] for i, (K, k) in enumerate(zip(densities, at, strict=True)))
+def _fitted(surface: Surface, sources) -> list[Jet]:
+    """The best jets of a surface."""
     return [
         replace(j, density_kgm3=float(K), width_rad=float(w))
-        for j, K, w in zip(sources, densities, widths, strict=True)
-    ], left
+        for j, K, w in zip(sources, surface.densities[surface.best], surface.widths(), strict=True)
+    ]
 
 
 def _source(surface: Surface, jet_number: int, jet: Jet, limit: float) -> Source:
     """A jet with the intervals of its profiles; None at an end that the data leave open."""
-    inside = WIDTHS_RAD[surface.width_profile(jet_number) <= limit]
-    step = np.sqrt(WIDTHS_RAD[1] / WIDTHS_RAD[0])  # the lattice's own
+    lattice = surface.widths_rad[jet_number]
+    inside = lattice[surface.width_profile(jet_number) <= limit]
+    step = np.sqrt(lattice[1] / lattice[0])  # the lattice's own
     widths = (
-        None if inside[0] == WIDTHS_RAD[0] else float(inside[0] / step),
-        None if inside[-1] == WIDTHS_RAD[-1] else float(inside[-1] * step),
+        None if inside[0] <= WIDTHS_RAD[0] * (1 + 1e-9) else float(inside[0] / step),
+        None if inside[-1] >= WIDTHS_RAD[-1] * (1 - 1e-9) else float(inside[-1] * step),
     )
     largest = max(surface.densities[surface.misfit <= limit, jet_number].max(), jet.density_kgm3)
     low = _crossing(surface, jet_number, jet.density_kgm3, 0.0, limit)
@@ -171,26 +179,19 @@ def _crossing(surface: Surface, jet_number: int, best: float, end: float, limit:
     return 0.5 * (inner + outer)
 
 
-def _correlation(sources, flyby, t, per_density, power, angle, widths) -> np.ndarray:
+def _correlation(sources, flyby, data: JetData, power, angle, widths) -> np.ndarray:
     """Of densities, then widths, by the curvature at the fit; NaN for the width of a jet that is not there."""
     n = len(sources)
 
-    def momentum(x):
+    def seen(x):
         w = x[n:] if widths == "own" else np.repeat(x[n:], n)
-        rho = plume_density(
-            [replace(j, density_kgm3=K, width_rad=v) for j, K, v in zip(sources, x[:n], w, strict=True)],
-            flyby, fine, power=power, angle=angle,
-        )  # fmt: skip
-        H = np.interp(t, fine, cumulative_trapezoid(per_density * rho, fine, initial=0))
-        return H - H.mean()
+        jets = [replace(j, density_kgm3=K, width_rad=v) for j, K, v in zip(sources, x[:n], w, strict=True)]
+        return data.A @ plume_density(jets, flyby, data.nodes_s, power=power, angle=angle)
 
-    fine = np.arange(t[0], t[-1] + _STEP_S, _STEP_S)
     K = np.array([j.density_kgm3 for j in sources])
     w = np.array([j.width_rad for j in sources]) if widths == "own" else np.array([sources[0].width_rad])
     x, steps = np.r_[K, w], np.r_[np.full(n, 1e-3 * max(K.max(), 1e-15)), 1e-3 * w]
-    J = np.stack(
-        [(momentum(x + h * e) - momentum(x - h * e)) / 2 for h, e in zip(steps, np.eye(len(x)), strict=True)], axis=1
-    )
+    J = np.stack([(seen(x + h * e) - seen(x - h * e)) / 2 for h, e in zip(steps, np.eye(len(x)), strict=True)], axis=1)
     known = np.linalg.norm(J, axis=0) > 0
     found = np.full((len(x), len(x)), np.nan)
     J = J[:, known] / np.linalg.norm(J[:, known], axis=0)
@@ -205,7 +206,7 @@ def _scores(sources, columns, y, worth: float) -> tuple[Score, ...]:
     found = []
     for n in range(1, len(sources) + 1):
         for some in combinations(range(len(sources)), n):
-            for widths in WIDTHS if n > 1 else WIDTHS[:1]:
+            for widths in WIDTHS if 1 < n <= _MOST_OWN else WIDTHS[1:] if n > _MOST_OWN else WIDTHS[:1]:
                 least = Surface(y, columns[list(some)], widths == "common").least
                 free = n + (n if widths == "own" else 1) + 1
                 names = tuple(sources[i].name for i in some)
@@ -236,3 +237,15 @@ def _doubts(found, scores, widths: str, alike: float) -> list[str]:
             f"residuals follow each other ({alike:.1f} are worth one): these jets do not explain all of the momentum"
         )
     return doubts
+
+
+def _misfit_doubts(data: JetData, left: np.ndarray, free: int) -> list[str]:
+    """Rows of unit noise say by themselves whether jets explain them."""
+    if data.unit != "sigma":
+        return []
+    square, freedom = float(left @ left), len(left) - free
+    if square < freedom + 5 * np.sqrt(2 * freedom):
+        return []
+    return [
+        f"these jets do not explain the telemetry: chi-square {square:.0f} for {freedom}; their form, the loop's gains, or another torque?"
+    ]

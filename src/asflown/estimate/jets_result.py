@@ -6,21 +6,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..dynamics.plume import Jet
+from ..dynamics.plume import Jet, plume_density
 from .density_result import DensityResult
+
+#: What the samples of a fit are.
+_OF = {
+    "momentum": " of momentum",
+    "forward": " of all channels through the loop",
+    "printed": " of momentum beside, the density fitted as in 004",
+}
 
 
 @dataclass(frozen=True)
 class Source:
-    """A fitted jet and the 95 % intervals of its density [kg/m3] and width [rad]; None at an open end."""
+    """A fitted jet and the 95 % intervals of its density [kg/m3] and width [rad]; None at an open end, both None where there is none."""
 
     jet: Jet
-    density_95: tuple[float, float | None]
+    density_95: tuple[float | None, float | None]
     width_95: tuple[float | None, float | None]
 
     @property
     def density_known(self) -> bool:
-        return self.density_95[0] > 0 and self.density_95[1] is not None
+        low, high = self.density_95
+        return low is not None and low > 0 and high is not None
 
     @property
     def width_known(self) -> bool:
@@ -38,6 +46,8 @@ class Source:
 
     def __str__(self) -> str:
         low, high = self.density_95
+        if low is None:
+            return f"  {self.jet.name:<12}{1e12 * self.jet.density_kgm3:6.3g}   no interval                    {self.jet.width_rad:.2f}"
         K = f"{1e12 * self.jet.density_kgm3:6.3g}   95 %: {1e12 * low:.3g} to {_end(high, 1e12)}"
         if not self.density_known:
             return f"  {self.jet.name:<12}{K:<36}   not identified"
@@ -74,7 +84,9 @@ class JetsResult:
     power: float
     angle: str
     model_kgm3: np.ndarray
-    momentum_rms_Nms: float
+    fit: str
+    rms: float  # of what the fit leaves, in ``unit``
+    unit: str
     samples: int
     worth: float
     doubts: tuple[str, ...] = ()
@@ -82,8 +94,10 @@ class JetsResult:
     @property
     def peak(self) -> tuple[float, float]:
         """Largest density of the model [kg/m3] and its time from closest approach [s]."""
-        k = int(np.argmax(self.model_kgm3))
-        return float(self.model_kgm3[k]), float(self.density.time_s[k])
+        d, near = self.density, float(self.density.time_s[np.argmax(self.model_kgm3)])
+        t = np.arange(near - 2, near + 2, 0.05)  # a cusp lies between instants
+        rho = plume_density([s.jet for s in self.sources], d.flyby, t, power=self.power, angle=self.angle)
+        return float(rho.max()), float(t[np.argmax(rho)])
 
     def record(self) -> dict:
         """The JSON form, without command and provenance."""
@@ -101,7 +115,9 @@ class JetsResult:
             "rms_kgm3": self.rms_kgm3,
             "sigma_scale_fraction": d.scale,
             "evidence": {"criterion": "Schwarz", "models": [s.record() for s in self.scores]},
-            "momentum_rms_Nms": self.momentum_rms_Nms,
+            "fit": self.fit,
+            "momentum_rms_Nms": self.rms if self.unit == "N m s" else None,
+            "innovations_rms_sigma": self.rms if self.unit == "sigma" else None,
             "samples": self.samples,
             "independent_samples": self.worth,
             "peak": {"density_kgm3": peak, "time_s": at, "altitude_m": float(d.flyby.altitude(at))},
@@ -115,7 +131,7 @@ class JetsResult:
         d, (peak, at) = self.density, self.peak
         lines = [
             f"Jets · {d.craft} · {d.flyby.name} · {self.widths} width{'s' if self.widths == 'own' else ''}, power {self.power:g} · closest approach {d.closest_approach}",
-            f"  {self.samples} samples of momentum, worth {self.worth:.0f} · all densities ± {100 * d.scale:.1f} % together",
+            f"  {self.samples} samples{_OF[self.fit]}, worth {self.worth:.0f} · all densities ± {100 * d.scale:.1f} % together",
             "              density [1e-12 kg/m3]                  width [rad]",
             *map(str, self.sources),
             f"  together     {1e12 * peak:.3g}e-12 at the most, at {at:+.0f} s; {1e12 * self.rms_kgm3:.2g}e-12 rms from the density reconstructed",

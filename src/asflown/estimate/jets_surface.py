@@ -18,12 +18,13 @@ WIDTHS_RAD = np.geomspace(0.05, 1.6, 44)
 class Surface:
     """Misfit of every combination of widths.
 
-    y (N,): centred; columns (J, W, N): centred impulses per density, for each jet and width of ``WIDTHS_RAD``.  ``common``: all
-    jets have one width."""
+    y (N,); columns (J, W, N): what each jet of unit density gives, for each of its widths (J, W), those of ``WIDTHS_RAD`` unless
+    given.  ``common``: all jets have one width."""
 
-    def __init__(self, y: np.ndarray, columns: np.ndarray, common: bool):
+    def __init__(self, y: np.ndarray, columns: np.ndarray, common: bool, widths_rad: np.ndarray | None = None):
         self.jets, self.count = columns.shape[:2]
         self.common = common
+        self.widths_rad = np.tile(WIDTHS_RAD, (self.jets, 1)) if widths_rad is None else widths_rad
         flat = columns.reshape(-1, columns.shape[2])
         self.size = float(
             np.sqrt(np.mean(flat**2))
@@ -70,10 +71,19 @@ class Surface:
 
     def widths(self) -> np.ndarray:
         """Of the best combination, (J,). [rad]"""
-        return WIDTHS_RAD[self._at[self.best] - self.count * np.arange(self.jets)]
+        return self.widths_rad[np.arange(self.jets), self._at[self.best] - self.count * np.arange(self.jets)]
+
+    def finer(self, limit: float, count: int) -> np.ndarray:
+        """Widths (J, count) over what each jet's profile leaves open, and a step beyond."""
+        found = []
+        for j in range(self.jets):
+            inside = np.flatnonzero(self.width_profile(j) <= limit)
+            low, high = max(inside[0] - 1, 0), min(inside[-1] + 1, self.count - 1)
+            found.append(np.geomspace(self.widths_rad[j, low], self.widths_rad[j, high], count))
+        return np.array(found)
 
     def width_profile(self, jet: int) -> np.ndarray:
-        """Least misfit for each of ``WIDTHS_RAD`` of one jet."""
+        """Least misfit for each width of one jet."""
         cube = self.misfit.reshape(self.shape)
         return cube if self.common else cube.min(axis=tuple(a for a in range(self.jets) if a != jet))
 

@@ -8,6 +8,7 @@ import numpy as np
 from scipy import signal
 
 from ..kit.files import write_text
+from .whitened import AxisData
 
 AXES = ("x", "y", "z")
 
@@ -64,6 +65,7 @@ class TorqueResult:
     settings: dict = field(default_factory=dict)  # what the estimator chose: windows, model, inertia
     fits: tuple[dict, ...] = ()  # the polynomial method's orders and misfits
     paths_Nm: np.ndarray | None = None  # (K, F, 3), torques drawn from the joint posterior, at paths_time_s
+    evidence: dict[str, AxisData] = field(default_factory=dict)  # of the fused method: each axis's data and levels
     impulses: tuple[
         tuple[float, float, str, float, float | None], ...
     ] = ()  # asked for: start, stop, axis, value, sigma

@@ -84,7 +84,7 @@ def disturbance_torque(
             beforehand.append(f"the fused method cannot be used ({where}{why.what}): this is the momentum method")
     except BadInput as why:
         raise why.within(telemetry.source) from why.__cause__
-    grid, torque, sigma, momentum, settings, doubts, fits, *paths = answer
+    grid, torque, sigma, momentum, settings, doubts, fits, *drawn = answer
     time_s = grid.from_epoch(telemetry)
     columns = list(range(3)) if axis == "all" else [AXES.index(axis)]
     for j in columns:
@@ -103,7 +103,8 @@ def disturbance_torque(
         relative=subject.relative and method != "transfer",
         settings=settings | _inertia_used(subject),
         fits=tuple(fits),
-        paths_Nm=paths[0] if paths else None,
+        paths_Nm=drawn[0] if drawn else None,
+        evidence=drawn[1] if drawn else {},
     )
     doubts = [*beforehand, *subject.doubts, *doubts, *_thruster_doubts(subject), *_relative_doubts(subject, result)]
     if method == "momentum" and variant == "corrected":
@@ -119,8 +120,8 @@ def _run(subject: Subject, method, variant, axis, model, order, window_s, of_fus
     if method == "fused":
         prior, loop, considered = of_fused
         axes = (0, 1, 2) if axis == "all" else (AXES.index(axis),)
-        *answer, paths = torque_fused.fused(subject, prior, axes, loop, considered)
-        return (*answer, (), paths)
+        *answer, paths, data = torque_fused.fused(subject, prior, axes, loop, considered)
+        return (*answer, (), paths, data)
     module = {"momentum": torque_momentum, "transfer": torque_transfer}[method]
     options: dict = {}
     if method == "transfer":

@@ -34,6 +34,7 @@ from .levels import AxisFit, fit_doubts, fit_levels
 from .records import Record, gather
 from .result import spread
 from .subject import Grid, Subject
+from .whitened import AxisData
 
 PRIORS = ("edges", "matern", "wiener")
 
@@ -58,6 +59,7 @@ class Solved:
     innovations: dict[str, Innovations]
     settings: dict
     doubts: list[str]
+    data: AxisData
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ def fused(
     considered: dict[str, float] | None = None,
     seed: int = _SEED,
 ):
-    """Returns grid, torque (M, 3), sigma, momentum, settings, doubts, paths (K, M, 3); NaN for axes not asked for.
+    """Returns grid, torque (M, 3), sigma, momentum, settings, doubts, paths (K, M, 3), axis -> AxisData; NaN for axes not asked for.
 
     ``prior``: one of PRIORS, or None: edges, but matern in a record too long for it.  ``loop``: one of
     records.LOOPS, or None: modelled where it can be.  ``considered``: in place of some of CONSIDERED.
@@ -127,14 +129,16 @@ def fused(
         doubts += s.doubts
     unexplained = [d for a, s in solved.items() for d in innovation_doubts(a, s.innovations)]
     if unexplained and loop is None and record.loop == "modelled":
-        *answer, other_settings, others, drawn = fused(subject, prior, axes, "measured", considered, seed)
+        *answer, other_settings, others, drawn, data = fused(subject, prior, axes, "measured", considered, seed)
         if other_settings["unexplained_channels"] < len(unexplained):
             instead = f"the loop as the craft file describes it is not used, the actuators' action is taken as measured: {unexplained[0]}"
-            return (*answer, other_settings, [instead, *others], drawn)
+            return (*answer, other_settings, [instead, *others], drawn, data)
     settings = {
         "prior": prior, "loop": record.loop, "seed": seed, "unexplained_channels": len(unexplained), **_settings(solved)
     }  # fmt: skip
-    return record.grid, torque, sigma, momentum, settings, doubts, paths
+    start_s = float(record.grid.from_epoch(subject.telemetry)[0])
+    data = {a: replace(s.data, start_s=start_s) for a, s in solved.items()}
+    return record.grid, torque, sigma, momentum, settings, doubts, paths, data
 
 
 def _too_long_for_corners(grid: Grid) -> str:
@@ -242,7 +246,8 @@ def _solve(
     }
     doubts += innovation_doubts(axis, innovations) + considered_doubts(axis, shares, post.considered)
     wanted = times.wanted
-    return Solved(fit, post.mean[wanted], post.paths[:, wanted], off, innovations, post.settings, doubts)
+    kept = AxisData(body, fit.levels, times, data, learnt, 0.0)
+    return Solved(fit, post.mean[wanted], post.paths[:, wanted], off, innovations, post.settings, doubts, kept)
 
 
 def _columns(body: Body, fit: AxisFit, times: Times, data: Measurements, considered: dict[str, float]):

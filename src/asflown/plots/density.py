@@ -45,6 +45,34 @@ def draw_published_peaks(result: DensityResult, ax):
     return ax
 
 
+def draw_noticed(result: DensityResult, ax):
+    """First and last instant at which the gas stands out (triangles down), and 004's points P and R (up).  Returns ax."""
+    n = result.noticed
+    if n is not None:
+        ax.plot([n.first_s, n.last_s], [0, 0], "v", color=BLUE, markersize=6, label="gas stands out from, to")
+        if n.published_s is not None:
+            ax.plot(n.published_s, [0, 0], "^", color=ORANGE, markersize=5, label="P and R, published")
+    return ax
+
+
+def draw_peak(result: DensityResult, ax):
+    """The peak with its 95 % in time and in shape.  Returns ax."""
+    p = result.peak
+    if p.sigma_time_s is not None and p.sigma_shape_kgm3 is not None:
+        bars = [1.96 * _SCALE * p.sigma_shape_kgm3], [1.96 * p.sigma_time_s]
+        ax.errorbar(
+            [p.time_s],
+            [_SCALE * p.density_kgm3],
+            *bars,
+            fmt="o",
+            color="black",
+            markersize=4,
+            capsize=3,
+            label=f"peak {p.way}, 95 %",
+        )
+    return ax
+
+
 def draw_bound(result: DensityResult, ax):
     """What torques left out may feign at most.  Returns ax."""
     ax.plot(
@@ -69,7 +97,9 @@ def save_density_figure(result: DensityResult, path) -> None:
     figure, (ax,) = new_figure(1, height=4.4)
     draw_density(result, ax)
     draw_bound(result, ax)
+    draw_noticed(result, ax)
     draw_published_peaks(result, ax)
+    draw_peak(result, ax)
     finish(figure, ax, result, f"Density met by {result.craft}, {result.flyby.name}", result.doubts)
     save(figure, path)
 

@@ -139,7 +139,7 @@ def draw_from_pole(result: DensityResult, ax):
         way = np.array([np.cos(np.radians(west)), np.sin(np.radians(west))])
         ax.plot(*np.outer(way, [0, reach]), color=GREY, linewidth=0.4)
         ax.annotate(f"{west}° W", 1.04 * reach * way, fontsize=7, color=GREY, ha="center", va="center")
-    start, stop = (result.noticed_s or (-60.0, 60.0)) if flyby.noticed_s is None else flyby.noticed_s
+    start, stop = _span(result) or (-60.0, 60.0)
     path = _from_south(flyby, np.linspace(start - 60, stop + 60, 400))
     inside = np.hypot(*path.T) <= reach
     ax.plot(*path[inside].T, color=BLUE, linewidth=1.6, label=f"trajectory {flyby.name}")
@@ -170,24 +170,35 @@ def draw_readings(telemetry: Telemetry, stem: str, closest_s: float, ax, scale: 
 
 
 def draw_torque(result: DensityResult, ax):
-    """Torque about the flyby's axis with its 95 % band, and the gravity gradient where it is taken off.  Returns ax."""
-    t, T = result.time_s, 1e3 * result.torque_Nm
-    if result.sigma_shape_kgm3 is not None:
-        half = 1.96 * 1e3 * result.sigma_shape_kgm3 * abs(result.torque_per_density)
-        ax.fill_between(t, T - half, T + half, color=BLUE, alpha=0.25, linewidth=0, label="95 %")
-    ax.plot(t, T, color=BLUE, linewidth=1.4, label=f"{result.method}, {result.variant}")
+    """Torque about the flyby's axes, with its 95 % band where it is one, and the gravity gradient where it is taken off.  Returns ax."""
+    t = result.time_s
+    torques = 1e3 * result.torque_Nm.reshape(len(t), -1)
+    one = len(result.axis) == 1
+    if one and result.sigma_shape_kgm3 is not None:
+        half = 1.96 * 1e3 * result.sigma_shape_kgm3 * np.abs(result.per_density(result.axis, t))
+        ax.fill_between(
+            t, torques[:, 0] - half, torques[:, 0] + half, color=BLUE, alpha=0.25, linewidth=0, label="95 %"
+        )
+    for a, T in zip(result.axis, torques.T, strict=True):
+        color = BLUE if one else BY_AXIS[AXES.index(a)]
+        ax.plot(t, T, color=color, linewidth=1.4, label=f"{result.method}, {result.variant}{'' if one else f', {a}'}")
     if result.gravity_gradient_Nm is not None:
-        ax.plot(t, 1e3 * result.gravity_gradient_Nm, color=ORANGE, linewidth=1.0, label="gravity gradient")
+        for T in 1e3 * result.gravity_gradient_Nm.reshape(len(t), -1).T:
+            ax.plot(t, T, color=ORANGE, linewidth=1.0, label="gravity gradient")
     ax.set_ylabel("torque [mN m]")
     return ax
 
 
 def draw_momentum(samples, result: DensityResult, telemetry: Telemetry, closest_s: float, ax):
-    """Momentum of wheels and body about the flyby's axis, less its first value.  Returns ax."""
-    H = samples.momentum[:, AXES.index(result.axis)]
+    """Momentum of wheels and body about the flyby's axes, less its first value.  Returns ax."""
     t = telemetry.seconds(samples.tai_ns) - closest_s
-    ax.plot(t, H - H[0], ".", color=BLUE, markersize=3, label="wheels and body")
-    ax.plot(t, (H - samples.stored[:, AXES.index(result.axis)]), color=GREEN, linewidth=0.8, label="of it the body")
+    for a in result.axis:
+        j = AXES.index(a)
+        H, body = samples.momentum[:, j], samples.momentum[:, j] - samples.stored[:, j]
+        one = len(result.axis) == 1
+        name = "" if one else f", {a}"
+        ax.plot(t, H - H[0], ".", color=BLUE if one else BY_AXIS[j], markersize=3, label=f"wheels and body{name}")
+        ax.plot(t, body, color=GREEN if one else BY_AXIS[j], linewidth=0.8, label=f"of it the body{name}")
     ax.set_ylabel("momentum gained [N m s]")
     return ax
 
@@ -198,8 +209,15 @@ def _closest(result: DensityResult, telemetry: Telemetry) -> float:
     return float(telemetry.seconds(telemetry.moment(text.removesuffix(" UTC").removesuffix(" s"))))
 
 
+def _span(result: DensityResult) -> tuple[float, float] | None:
+    """When the gas was first and last noticed, as published, else as found. [s]"""
+    if result.flyby.noticed_s is not None:
+        return result.flyby.noticed_s
+    return None if result.noticed is None else (result.noticed.first_s, result.noticed.last_s)
+
+
 def _points(result: DensityResult) -> dict[str, float]:
-    first, last = result.flyby.noticed_s or result.noticed_s or (None, None)
+    first, last = _span(result) or (None, None)
     found = {"P": first, "Q": result.peak.time_s, "R": last}
     return {k: float(v) for k, v in found.items() if v is not None}
 
