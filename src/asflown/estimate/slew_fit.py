@@ -28,8 +28,8 @@ from .slew_model import (
 )
 from .slew_record import SlewRecord, third_difference_sigma
 
-#: Degrees of freedom of the acceleration's steps: between Cauchy's one and a few.
-_FREEDOM = 2.0
+#: Degrees of freedom of the acceleration's steps: tails for corners of ramps, and not so heavy that every step fits its own noise.
+_FREEDOM = 5.0
 #: Steps' variances settle slowly, each a little nearer: they go this much further than they would.
 _STRIDE = 1.6
 #: A corner is no looser than this: beyond it only rounding would show.
@@ -52,9 +52,9 @@ _TURNS = 8  # of the first round, in which the corners are found
 #: Factors by which one search may move a level; ten for the others.
 _REACH = {"jerk": 100.0, "kick": 100.0, "wander": 100.0, "coloured_s": 3.0}
 _LONGEST_S = 300.0
-#: Steps of momentum: looked for at instants this far apart [s], then between the best one's neighbours, so many at once;
-#: not nearer to an arc's ends than so many readings.
-_STEPS_APART_S, _STEPS_BETWEEN, _STEPS_AT_ONCE, _FEWEST_BESIDE = 20.0, 11, 20, 10
+#: Steps of momentum: tried at so many readings, then between the best one's neighbours, so many in one pass; not nearer to an
+#: arc's ends than so many readings.
+_STEPS_TRIED, _STEPS_BETWEEN, _STEPS_AT_ONCE, _FEWEST_BESIDE = 120, 11, 20, 10
 #: Steps that the noise levels are fitted on, where there are more.
 _ENOUGH = 2000
 
@@ -161,18 +161,21 @@ def momentum_step(fit: SlewFit, prior=None) -> tuple[float, float]:
     best = 0.0, 0.0
     for arc, (_, stop) in enumerate(fit.record.arcs):
         times = np.unique(momentum.time_s[momentum.arc == arc])
-        if len(times) < 2 * _FEWEST_BESIDE:
+        if len(times) <= 2 * _FEWEST_BESIDE:
             continue
-        low, high = times[_FEWEST_BESIDE], min(times[-_FEWEST_BESIDE], stop)
-        tried = np.linspace(low, high, max(3, int(np.ceil((high - low) / _STEPS_APART_S))))
+        inside = times[_FEWEST_BESIDE : len(times) - _FEWEST_BESIDE]
+        low, high = inside[0], min(inside[-1], stop)
+        tried = np.unique(
+            inside[np.linspace(0, len(inside) - 1, _STEPS_TRIED).astype(int)]
+        )  # denser where readings are
         while True:
             squares = _steps_told(fit, arc, tried, away)
             k = int(np.argmax(squares))
-            spacing = tried[1] - tried[0]
             best = max(best, (float(squares[k]), float(tried[k])))
-            if spacing <= cadence:
+            around = tried[max(k - 1, 0)], tried[min(k + 1, len(tried) - 1)]
+            if around[1] - around[0] <= 2 * cadence:
                 break
-            tried = np.linspace(max(tried[k] - spacing, low), min(tried[k] + spacing, high), _STEPS_BETWEEN)
+            tried = np.linspace(max(around[0], low), min(around[1], high), _STEPS_BETWEEN)
     return best[1], best[0]
 
 
