@@ -26,7 +26,8 @@ from ..dynamics.plume import FARTHEST_M, Jet, jet_density
 from .whitened import AxisData, Regression, regression
 
 POWERS = (1.0, 1.4, 2.0)
-WIDTHS_RAD = np.geomspace(0.1, 1.2, 24)
+#: Steps of 2.6 %: of 11 % they are wider than the posterior, which then sits on one of them and says too little.
+WIDTHS_RAD = np.geomspace(0.1, 1.2, 96)
 #: By how much all sources may lean from where they are said to stand; half of the prior is on none. [rad]
 LEANS_RAD = np.radians(np.arange(-10, 10.1, 1))
 #: Remainders as shares of the density thereabouts, and up to which altitudes the jets hold. [m]
@@ -84,20 +85,39 @@ def _nodes() -> np.ndarray:
     return np.arange(_SPAN_S[0], _SPAN_S[1] + _NODE_S / 2, _NODE_S)
 
 
-def _jet(jet: Jet, flyby: Flyby, time_s, form: int, width: float) -> np.ndarray:
-    """Density of a jet of unit K; ``form``: number of exponent and lean."""
+def _jet(jet: Jet, flyby: Flyby, time_s, form: int, width) -> np.ndarray:
+    """Density of a jet of unit K; ``form``: number of exponent and lean; ``width``: one, or (W, 1)."""
     power, lean = POWERS[form // len(LEANS_RAD)], LEANS_RAD[form % len(LEANS_RAD)]
     leaning = replace(jet, density_kgm3=1.0, width_rad=width, tilt_rad=jet.tilt_rad + lean)
     return jet_density(leaning, flyby, time_s, power=power)
 
 
+@dataclass(frozen=True)
+class _Shapes:
+    """Jets of height one at the nodes: shares (exponents and leans, widths, J, B) of a few curves (B, C).
+
+    ``sizes``: their heights at unit density (exponents and leans, widths, J).  All these thousands of curves are, to a ten-thousandth
+    of their height, sums of about a hundred, which makes the evidence of every choice cheap."""
+
+    shares: np.ndarray
+    curves: np.ndarray
+    sizes: np.ndarray
+
+    def of(self, form: int, width: int, ids: list[int]) -> np.ndarray:
+        """(len(ids), C)"""
+        return self.shares[form, width, ids] @ self.curves
+
+
 @lru_cache(maxsize=4)
-def _shapes(flyby: Flyby, sources: tuple[Jet, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Jets of height one at the nodes, (exponents and leans, widths, J, C), and their heights at unit density."""
+def _shapes(flyby: Flyby, sources: tuple[Jet, ...]) -> _Shapes:
     nodes, forms = _nodes(), range(len(POWERS) * len(LEANS_RAD))
-    shapes = np.array([[[_jet(j, flyby, nodes, f, w) for j in sources] for w in WIDTHS_RAD] for f in forms])
-    sizes = np.maximum(shapes.max(axis=-1), 1e-300)
-    return shapes / sizes[..., None], sizes
+    each = np.array([[_jet(j, flyby, nodes, f, WIDTHS_RAD[:, None]) for j in sources] for f in forms]).swapaxes(1, 2)
+    sizes = np.maximum(each.max(axis=-1), 1e-300)
+    each /= sizes[..., None]
+    rows = each.reshape(-1, len(nodes))
+    value, vector = np.linalg.eigh(rows.T @ rows)
+    curves = vector[:, value > 1e-12 * value[-1]].T
+    return _Shapes(each @ curves.T, curves, sizes)
 
 
 def _local(torque: np.ndarray, time_s: np.ndarray) -> np.ndarray:
@@ -129,7 +149,7 @@ class _Plume:
             closest_s,
         )
         self.nodes = _nodes()
-        self.shapes, self.sizes = _shapes(flyby, sources)
+        self.shapes = _shapes(flyby, sources)
         self.factors = [k(self.nodes) for k in per_density]
         self.answers = [a.answers(self.nodes + closest_s) for a in axes]
         self.local = [_local(a.smooth_torque(), a.time_s) for a in axes]
@@ -154,13 +174,12 @@ class _Plume:
         """Log of evidence times prior of every choice, (exponents and leans, widths, subsets and none)."""
         fits, y, W = self.regressions(way)
         base = sum(f.log_evidence for f in fits)
-        seen = self.shapes.reshape(-1, len(self.nodes)) @ np.asarray(np.linalg.qr(W, mode="r")).T
-        seen = seen.reshape(*self.shapes.shape[:3], -1)
-        G, b = seen @ np.swapaxes(seen, -1, -2), self.shapes @ (W.T @ y)
+        shares, of_curves = self.shapes.shares, W @ self.shapes.curves.T
+        G, b = shares @ (of_curves.T @ of_curves) @ np.swapaxes(shares, -1, -2), shares @ (of_curves.T @ y)
         lean = np.full(len(LEANS_RAD), -np.log(2 * (len(LEANS_RAD) - 1)))
         lean[_UPRIGHT] = -np.log(2)
         prior = np.tile(lean, len(POWERS))[:, None] - np.log(len(POWERS) * len(WIDTHS_RAD) * len(self.subsets))
-        log = np.full((*self.shapes.shape[:2], len(self.subsets) + 1), -np.inf)
+        log = np.full((*shares.shape[:2], len(self.subsets) + 1), -np.inf)
         for i, ids in enumerate(self.subsets):
             M = G[:, :, ids][:, :, :, ids] + np.eye(len(ids))  # a height's prior: half of a normal one, of sigma 1
             k = np.linalg.solve(M, b[:, :, ids, None])[..., 0]
@@ -178,11 +197,12 @@ class _Plume:
             if subset == len(self.subsets):
                 continue
             ids = self.subsets[subset]
-            heights = _positive(W @ self.shapes[form, width, ids].T, y, rng)
-            jets[row] = self.largest * heights @ self.shapes[form, width, ids]
+            shapes = self.shapes.of(form, width, ids)
+            heights = _positive(W @ shapes.T, y, rng)
+            jets[row] = self.largest * heights @ shapes
             for i, h in zip(ids, heights, strict=True):
                 unit = _jet(self.sources[i], self.flyby, fine, form, WIDTHS_RAD[width])
-                curves[row] += self.largest * h / self.sizes[form, width, i] * unit
+                curves[row] += self.largest * h / self.shapes.sizes[form, width, i] * unit
         rests, weights = [], []
         for f, k, per_density in zip(fits, self.factors, self.per_density, strict=True):
             t = f.axis.time_s - self.closest_s
