@@ -34,18 +34,21 @@ from asflown.estimate.curves import gaussian_torque
 from asflown.estimate.latent import Series, arrange, step_of
 from asflown.estimate.latent_loop import HeldBody, LoopLevels
 from asflown.estimate.levels import fit_levels
-from asflown.estimate.result import PEAK_REACH_S
+from asflown.estimate.peaks import PEAK_REACH_S
+from asflown.estimate.torque_fused import CONSIDERED
 from asflown.kit.ensemble import simulate
 from asflown.kit.errors import BadInput
 from asflown.kit.smoother import smooth
 from asflown.sim.scenario import load_scenario
 
 PROFILES = ("profile-1", "profile-2")
-#: Condition -> changes to the scenario; noise, inertia, spikes and loop are not scenario keys.
+#: Condition -> changes to the scenario; noise, inertia, drawn, spikes and loop are not scenario keys.  Drawn: what is believed of the craft is
+#: off by as much as the method allows for; elsewhere it is exactly what flies, and bands are wider than they need be.
 CONDITIONS: dict[str, dict] = {
     "nominal": {},
     "half noise": {"noise": "half"},
     "double noise": {"noise": "double"},
+    "craft drawn": {"drawn": True},
     "inertia 2 % high": {"inertia": 1.02},
     "inertia 2 % low": {"inertia": 0.98},
     "booms ring": {"flexible": True},
@@ -58,7 +61,7 @@ CONDITIONS: dict[str, dict] = {
     "controller unknown": {"loop": "measured"},
 }
 #: Runs of the long campaign; others get 40.
-RUNS = {"nominal": 200}
+RUNS = {"nominal": 200, "craft drawn": 200}
 _CORNER_S = 2.0
 
 
@@ -75,10 +78,25 @@ def spiked(telemetry, share: float, seed: int):
     return replace(telemetry, channels=channels)
 
 
+def drawn(craft, rng):
+    """Spin inertia and gains as they might be believed to be, off by their considered sigmas; by how much the inertia is."""
+    off = {name: 1 + sigma * rng.standard_normal() for name, sigma in CONSIDERED.items()}
+    wheels = tuple(w.model_copy(update={"spin_inertia": off["spin_inertia"] * w.spin_inertia}) for w in craft.wheels)
+    k = craft.wheel_controller
+    loop = k.model_copy(
+        update={
+            "bandwidth": np.sqrt(off["kp"] * off["kd"]) * k.bandwidth,
+            "damping": np.sqrt(off["kd"] / off["kp"]) * k.damping,
+        }
+    )
+    return craft.model_copy(update={"wheels": wheels, "wheel_controller": loop}), off["inertia"]
+
+
 def flown(profile: str, condition: str, seed: int):
     """Flight and craft of one run."""
     changes = dict(CONDITIONS[condition])
     noise, scale, spikes = changes.pop("noise", None), changes.pop("inertia", 1.0), changes.pop("spikes", 0.0)
+    off = changes.pop("drawn", False)
     changes.pop("loop", None)  # the estimator's, not the flight's
     plan = load_scenario(profile)
     if profile in PROFILES:
@@ -88,9 +106,11 @@ def flown(profile: str, condition: str, seed: int):
     if spikes:
         flight = replace(flight, telemetry=spiked(flight.telemetry, spikes, seed))
     craft = load_craft("cassini")
+    if off:
+        craft, scale = drawn(craft, np.random.default_rng([seed, 1]))
     if scale != 1:
         I_B = scale * craft.at(flight.telemetry.epoch_ns).inertia_kgm2
-        craft = load_craft("cassini", inertia=[*np.diag(I_B), I_B[0, 1], I_B[0, 2], I_B[1, 2]])
+        craft = craft.with_inertia([*np.diag(I_B), I_B[0, 1], I_B[0, 2], I_B[1, 2]])
     return flight, craft
 
 
@@ -151,10 +171,11 @@ def judged(r, true, error, peaks, corners) -> dict:
         near = np.min(np.abs(r.time_s[:, None] - corners), axis=1) <= _CORNER_S
         found |= {f"corner_{k}": float(np.mean(inside[f"{k}_95"][near])) for k in ("band", "sigma")}
     if peaks:
-        figures = [(*r.peak_height(a, PEAK_REACH_S, "y"), v) for a, v in peaks]
-        found["peak_percent"] = float(np.mean([100 * (h / v - 1) for h, _, v in figures]))
-        found["peak_sigma_percent"] = float(np.mean([100 * s / abs(v) for _, s, v in figures]))
-        found["peak_95"] = float(np.mean([abs(h - v) < 1.96 * s for h, s, v in figures]))
+        figures = [(r.peak(a, PEAK_REACH_S, "y"), v) for a, v in peaks]
+        found["peak_percent"] = float(np.mean([100 * (p.torque_Nm / v - 1) for p, v in figures]))
+        found["peak_sigma_percent"] = float(np.mean([100 * p.sigma_Nm / abs(v) for p, v in figures]))
+        found["peak_95"] = float(np.mean([p.holds(v) for p, v in figures]))
+        found["peak_sigma_95"] = float(np.mean([abs(p.torque_Nm - v) < 1.96 * p.sigma_Nm for p, v in figures]))
     return found
 
 
@@ -260,7 +281,7 @@ COLUMNS = (
     ("rms", "rms_mNm", "{:.2f}"), ("/momentum", "momentum_ratio", "{:.1f}"), ("/transfer", "transfer_ratio", "{:.1f}"),
     ("lag", "lag", "{:+.2f}"), ("95 %", "band_95", "{:.3f}"), ("68 %", "band_68", "{:.3f}"), ("1.96 s", "sigma_95", "{:.3f}"),
     ("1 s", "sigma_68", "{:.3f}"), ("corner", "corner_band", "{:.3f}"), ("c 1.96 s", "corner_sigma", "{:.3f}"),
-    ("peak %", "peak_percent", "{:+.2f}"), ("its sigma", "peak_sigma_percent", "{:.2f}"), ("in 95 %", "peak_95", "{:.3f}"),
+    ("peak %", "peak_percent", "{:+.2f}"), ("its sigma", "peak_sigma_percent", "{:.2f}"), ("in 95 %", "peak_95", "{:.3f}"), ("1.96 s", "peak_sigma_95", "{:.3f}"),
 )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ Answer, 2026-11 (seed 5): reach 0.  A mechanism's torque is smoother than drawn 
     2.5         +9.5 +- 6.7       +1.33   1.64       0.82
 
 Triangles are the other way round: there the extreme of the mean curve is 2 to 4 % low, and the result's own peaks
-(TorqueResult.peak_height) take each draw's extreme within 2.5 s.
+(TorqueResult.peak) take each draw's extreme within 2.5 s.
 """
 
 import sys
@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 
 from asflown import load_craft, load_telemetry
-from asflown.estimate.result import spread
+from asflown.estimate.peaks import spread
 from asflown.sim.fly_mission import fly_mission
 from asflown.trends.analyse import torque_about_hinge
 from asflown.trends.events import load_events

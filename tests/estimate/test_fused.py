@@ -14,7 +14,7 @@ from asflown.estimate.latent import Series, arrange, channel_of, response, step_
 from asflown.estimate.latent_free import FreeBody, FreeLevels
 from asflown.estimate.latent_loop import HeldBody, LoopLevels
 from asflown.estimate.levels import fit_levels
-from asflown.estimate.result import spread
+from asflown.estimate.peaks import spread
 from asflown.estimate.truth import against_truth
 from asflown.kit.ensemble import simulate
 from asflown.kit.errors import BadInput
@@ -385,9 +385,10 @@ def test_a_peak_has_a_sigma_that_holds():
         flight = fly("profile-2", seed=seed)
         r = fused(flight.telemetry)
         for t, v, _ in flight.truth.peaks:
-            height, sigma = r.peak_height(t, 8.0, "y")
-            pulls.append((height - v) / sigma)
-            assert sigma < 0.06 * abs(v)
+            p = r.peak(t, 8.0, "y")
+            pulls.append((p.torque_Nm - v) / p.sigma_Nm)
+            assert p.sigma_Nm < 0.06 * abs(v)
+            assert p.interval_95_Nm[0] < p.torque_Nm < p.interval_95_Nm[1]
     assert np.abs(pulls).max() < 4 and abs(np.mean(np.array(pulls) * np.tile([1, -1], 12))) < 1
 
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..craft.model import Craft
-from ..estimate.result import AXES, PEAK_REACH_S, TorqueResult
+from ..estimate.peaks import PEAK_REACH_S
+from ..estimate.result import AXES, TorqueResult
 from ..estimate.torque import METHODS, VARIANTS, disturbance_torque
 from ..estimate.truth import against_truth
 from ..kit.errors import BadInput, some_of
@@ -145,8 +146,7 @@ def _judge(result: TorqueResult, flight, axis: str) -> dict:
             near = np.min(np.abs(result.time_s[:, None] - [t for t, _ in peaks]), axis=1) <= _CORNER_S
             sample["corner"] = np.mean(inside[0.95][near])
         if peaks and result.paths_Nm is not None:
-            figures = [(*result.peak_height(t, PEAK_REACH_S, axis), v) for t, v in peaks]
-            sample["peak95"] = np.mean([s is not None and abs(h - v) < 1.96 * s for h, s, v in figures])
+            sample["peak95"] = np.mean([result.peak(t, PEAK_REACH_S, axis).holds(v) for t, v in peaks])
     return sample
 
 

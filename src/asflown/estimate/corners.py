@@ -16,22 +16,25 @@ sharp, since a straight line costs nothing; a rubbing hinge gets its roughness, 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from ..kit.compiled import jit
-from ..kit.ensemble import gains, paths, whiten
+from ..kit.ensemble import Gains, gains, paths, simulate, whiten
 from ..kit.smoother import Measurements
+from .corner_sampler import sample
 from .latent import Body, Levels, Posterior, Times, response
+from .peaks import peak_scale
 
-#: Sizes of the roughness as shares of the torque's own size near that time (studies/corners.py).
-ROUGHNESS = (0.05, 0.15, 0.45)
+#: Sizes of the roughness as shares of the torque's own size near that time, and time scales, short of what the telemetry
+#: resolves (studies/corners.py). [1], [s]
+ROUGHNESS = ((0.05, 4.0), (0.15, 4.0), (0.45, 4.0))
 #: What is given beforehand: nearly half to a torque of pure lines, as much to one with roughness; the last to the
 #: smooth torque of the fitted levels (studies/corners.py).
 _PRIOR = (0.45, 0.1, 0.2, 0.175, 0.075)
-#: Time scale of the roughness, short of what the telemetry resolves; and of what "thereabouts" means. [s]
-ROUGH_LENGTH_S, _NEARBY_S = 4.0, 10.0
+#: What "thereabouts" means. [s]
+_NEARBY_S = 10.0
 #: Degrees of freedom of the bends: Cauchy, so that one sharp corner does not widen all others.
 BEND_FREEDOM = 1.0
 #: Beta prior of the share of instants that are corners: one in a minute, to a factor of e, however near the candidates.
@@ -40,18 +43,88 @@ _CORNER_PRIOR = (1.0, 60.0)
 _CANDIDATES, COARSEST_S = 1200, 5.0
 #: Proposals for each candidate instant, the fewest in all, and the share thrown away.
 _PROPOSALS, _LEAST_PROPOSALS, _BURN_IN = 50, 30_000, 0.4
-_MOST_CORNERS = 160
 #: Chains whose draws are put together: one alone may stay with few corners and much roughness, or many and little.
 _CHAINS = 4
 #: Innovations whose mean square is above 1 by this many standard errors are not explained. [sigma]
 _UNEXPLAINED = 5.0
-#: A column of which less than this share is its own, beside those already in the set, is refused: rounding would decide.
-_ALONE = 1e-9
+#: Pure lines are as sure as they look: their flights would say 1.0 (0.8 to 1.1, studies/peak_scale.py), and take half as long as all else.
+_SURE_OF_LINES = 0.5
+#: Flights of the model itself that the peaks' sigma is held against; their share of the proposals, and draws of each.
+_FLIGHTS, _FLOWN_PROPOSALS, _FLOWN_DRAWS = 8, 0.5, 80
 
 
 def spacing_s(duration_s: float, step_s: float) -> float:
     """Distance of candidate corners in a record of that length. [s]"""
     return step_s * max(1, math.ceil(duration_s / step_s / _CANDIDATES))
+
+
+@dataclass(frozen=True)
+class _Way:
+    """One roughness: its filter, the columns whitened by it, and their normal equations."""
+
+    gains: Gains
+    columns: np.ndarray  # (M, C)
+    gram: np.ndarray  # (C, C)
+
+    @classmethod
+    def of(cls, g: Gains, seen: np.ndarray, begin: np.ndarray) -> _Way:
+        X = whiten(g, seen, begin)
+        return cls(g, X, X.T @ X)
+
+
+@dataclass(frozen=True)
+class _Search:
+    """What does not depend on the values measured: candidate corners, their responses, and priors.
+
+    Columns are the line's two, those of what is taken as known, and a bend at every candidate."""
+
+    body: Body
+    times: Times
+    basis: np.ndarray  # (N, 2 + candidates), torque of a unit of each [N m]
+    seen: np.ndarray  # (M, C), what of it is measured
+    always: np.ndarray  # prior sigma of the columns that are in every set
+    bend_variance: float
+    corner_prior: np.ndarray
+    proposals: int
+    rng: np.random.Generator
+
+    @property
+    def fixed(self) -> int:
+        return len(self.always)
+
+    def lines(self, coefficients: np.ndarray) -> np.ndarray:
+        """Torques (K, N) of coefficients (K, C), without roughness."""
+        return np.delete(coefficients, np.s_[2 : self.fixed], axis=1) @ self.basis.T
+
+    def walk(
+        self,
+        ways: list[_Way],
+        prior,
+        own: list[np.ndarray],
+        evidence,
+        start: np.ndarray,
+        count: int,
+        effort=1.0,
+        level=0,
+    ):
+        """Coefficients (K, C), numbers of corners and roughness of ``count`` draws; ``own``: data whitened in each way (M,)."""
+        b = np.array([w.columns.T @ o for w, o in zip(ways, own, strict=True)])
+        proposals = int(effort * self.proposals)
+        return sample(
+            np.array([w.gram for w in ways]), b, np.array(evidence), np.log(prior), self.always, self.bend_variance, self.corner_prior, BEND_FREEDOM,
+            proposals, int(_BURN_IN * proposals), count, start, level, self.rng,
+        )  # fmt: skip
+
+    def torques(self, ways: list[_Way], value: np.ndarray, coefficients: np.ndarray, which: np.ndarray) -> np.ndarray:
+        """Torques (K, N) of draws given the measurements (M,), their roughness drawn too."""
+        torque = self.lines(coefficients)
+        residual = value[:, None] - self.seen @ coefficients.T
+        for k in range(1, len(ways)):
+            mine = which == k
+            if mine.any():
+                added = paths(ways[k].gains, residual[:, mine], [self.body.torque], self.rng)[:, :, 0]
+                torque[mine] += self.body.inertia_kgm2 * added
+        return torque
 
 
 def draw_torques(
@@ -70,7 +143,6 @@ def draw_torques(
     wanted = times.seconds[times.wanted]
     every = round(spacing_s(np.ptp(wanted), float(wanted[1] - wanted[0])) / (wanted[1] - wanted[0]))
     candidates = wanted[::every]
-    spacing = float(candidates[1] - candidates[0])
     t = times.seconds[:, None]
     basis = np.hstack([np.ones_like(t), t - t[0], np.maximum(t - candidates, 0.0)])
     lines = response(body, levels, times, data, basis)
@@ -78,246 +150,71 @@ def draw_torques(
     fixed = 2 + columns.shape[1]
     begin = np.concatenate([np.zeros(fixed, int), np.searchsorted(times.seconds, candidates)])
     slope = levels.torque_Nm * math.sqrt(3) / levels.length_s
-    always = np.array([levels.torque_Nm, slope, *np.ones(columns.shape[1])])
-    of_torque = np.r_[0, 1, fixed : len(begin)]
-    proposals = max(_LEAST_PROPOSALS, _PROPOSALS * len(candidates))
+    search = _Search(
+        body, times, basis, seen, np.array([levels.torque_Nm, slope, *np.ones(columns.shape[1])]), slope**2,
+        np.array([_CORNER_PRIOR[0], _CORNER_PRIOR[1] / float(candidates[1] - candidates[0])]),
+        max(_LEAST_PROPOSALS, _PROPOSALS * len(candidates)), rng,
+    )  # fmt: skip
 
-    def chain(grams, share, proposals, count, corners):
-        G, b, evidence = grams
-        return _sample(
-            G, b, evidence, np.log(share), always, slope**2, np.array([_CORNER_PRIOR[0], _CORNER_PRIOR[1] / spacing]), BEND_FREEDOM,
-            proposals, int(_BURN_IN * proposals), count, _MOST_CORNERS, corners, rng,
-        )  # fmt: skip
+    def way(size_Nm, length_s: float) -> _Way:
+        return _Way.of(gains(body.model(levels, times, length_s, size_Nm), data), seen, begin)
 
-    def whitened(size_Nm, length_s=ROUGH_LENGTH_S):
-        g = gains(body.model(levels, times, length_s, size_Nm), data)
-        X = whiten(g, seen, begin)
-        return g, (X.T @ X, X.T @ g.own, g.log_likelihood)
-
-    def stacked(ways):
-        return tuple(np.array(x) for x in zip(*(gram for _, gram in ways), strict=True))
-
-    plain = whitened(np.zeros(len(t)))
-    first, _, _ = chain(stacked([plain]), np.ones(1), proposals, count, np.empty(0, np.int64))
+    plain = way(np.zeros(len(t)), ROUGHNESS[0][1])
+    first, _, _ = search.walk(
+        [plain], np.ones(1), [plain.gains.own], [plain.gains.log_likelihood], np.empty(0, np.int64), count
+    )
     found = fixed + np.flatnonzero(first[-1, fixed:])
-    first = first[:, of_torque]
-    size = np.sqrt(gaussian_filter1d(np.mean((first @ basis.T) ** 2, axis=0), _NEARBY_S / _step(times), mode="nearest"))
-    ways = [plain, *[whitened(r * size) for r in ROUGHNESS], whitened(levels.torque_Nm, levels.length_s)]
-    grams, kept = stacked(ways), -(-count // _CHAINS)
+    square = np.mean(search.lines(first) ** 2, axis=0)
+    size = np.sqrt(gaussian_filter1d(square, _NEARBY_S / _step(times), mode="nearest"))
+    ways = [plain, *[way(r * size, s) for r, s in ROUGHNESS], way(levels.torque_Nm, levels.length_s)]
+    own, evidence = [w.gains.own for w in ways], [w.gains.log_likelihood for w in ways]
     for effort in (1, 10):
-        drawn = [chain(grams, np.array(_PRIOR), effort * proposals, kept, found) for _ in range(_CHAINS)]
+        drawn = [search.walk(ways, _PRIOR, own, evidence, found, -(-count // _CHAINS), effort) for _ in range(_CHAINS)]
         bends, corners, which = (np.concatenate(x)[:count] for x in zip(*drawn, strict=True))
         usual = int(np.bincount(which).argmax())
-        g = ways[usual][0]
-        left = g.own - whiten(g, seen @ bends[which == usual].mean(axis=0)[:, None])[:, 0]
+        left = own[usual] - ways[usual].columns @ bends[which == usual].mean(axis=0)
         explained = np.mean(left**2) < 1 + _UNEXPLAINED * math.sqrt(2 / len(left))
         if explained:
             break
-    torque = bends[:, of_torque] @ basis.T
-    residual = data.value[:, None] - seen @ bends.T
-    for k in range(1, len(ways)):
-        mine = which == k
-        if mine.any():
-            added = paths(ways[k][0], residual[:, mine], [body.torque], rng)[:, :, 0]
-            torque[mine] += body.inertia_kgm2 * added
+    torque = search.torques(ways, data.value, bends, which)
+    mean, as_lines = torque.mean(axis=0), float(np.mean(which == 0))
     settings = {
         "corners": float(corners.mean()),
-        "lines_probability": float(np.mean(which == 0)),
+        "lines_probability": as_lines,
         "smooth_probability": float(np.mean(which == len(ways) - 1)),
         "explained": bool(explained),
     }
-    return Posterior(torque.mean(axis=0), torque, bends[:, 2:fixed], left, settings)
+    if explained and as_lines < _SURE_OF_LINES:
+        true, flown = _flown_again(search, ways, levels, data, bends, which, torque)
+        settings["peak_scale"] = peak_scale(times.seconds[times.wanted], mean[times.wanted], true, flown)
+    return Posterior(mean, torque, bends[:, 2:fixed], left, settings)
+
+
+def _flown_again(search: _Search, ways: list[_Way], levels: Levels, data: Measurements, bends, which, torque):
+    """Some of the drawn torques (F, N wanted), and what is made of each from telemetry the model itself would give of it (F, K, N wanted)."""
+    body, times, rng, fixed = search.body, search.times, search.rng, search.fixed
+    chosen = rng.choice(len(torque), _FLIGHTS, replace=False)
+    quiet = simulate(ways[0].gains.model, data, [body.torque], _FLIGHTS, rng)[1]  # of no torque at all: noise
+    value = (
+        response(body, levels, times, data, torque[chosen].T)
+        + search.seen[:, 2:fixed] @ bends[chosen, 2:fixed].T
+        + quiet
+    )
+    own = [whiten(w.gains, value) for w in ways]
+    wanted, flown = times.wanted, []
+    for k, j in enumerate(chosen):
+        evidence = [
+            w.gains.log_likelihood + 0.5 * (w.gains.own @ w.gains.own - o[:, k] @ o[:, k])
+            for w, o in zip(ways, own, strict=True)
+        ]
+        start = fixed + np.flatnonzero(bends[j, fixed:])
+        again, _, rough = search.walk(
+            ways, _PRIOR, [o[:, k] for o in own], evidence, start, _FLOWN_DRAWS, _FLOWN_PROPOSALS, which[j]
+        )
+        flown.append(search.torques(ways, value[:, k], again, rough)[:, wanted])
+    return torque[chosen][:, wanted], np.array(flown)
 
 
 def _step(times: Times) -> float:
     """Mean step: the instants are nearly even, and the neighbourhood need not be exact."""
     return float(np.mean(np.diff(times.seconds)))
-
-
-@jit
-def _marginal(G, b, active, count, precision, L, z):
-    """Log evidence of a set of columns with their coefficients integrated out; leaves Cholesky's L and z = L^-1 b."""
-    total = 0.0
-    for r in range(count):
-        at = active[r]
-        for c in range(r + 1):
-            s = G[at, active[c]]
-            if c == r:
-                s += precision[r]
-            for i in range(c):
-                s -= L[r, i] * L[c, i]
-            if c < r:
-                L[r, c] = s / L[c, c]
-            elif s > _ALONE * (G[at, at] + precision[r]):
-                L[r, r] = math.sqrt(s)
-            else:
-                return -np.inf
-        s = b[at]
-        for i in range(r):
-            s -= L[r, i] * z[i]
-        z[r] = s / L[r, r]
-        total += 0.5 * (z[r] * z[r] + math.log(precision[r])) - math.log(L[r, r])
-    return total
-
-
-@jit
-def _without(active, precision, count, j, active2, precision2):
-    """Copy a set without its entry j; returns how many are left."""
-    k = 0
-    for i in range(count):
-        if i != j:
-            active2[k], precision2[k] = active[i], precision[i]
-            k += 1
-    return k
-
-
-@jit
-def _between(left, right, reach, on, extra):
-    """Free instants (or ``extra``) within ``reach`` of both: where a merged corner may lie."""
-    found = 0
-    for x in range(left + 1, right):
-        if x - left <= reach and right - x <= reach and (not on[x] or x == extra):
-            found += 1
-    return found
-
-
-@jit
-def _sample(G, b, evidence, prior, always, size, corner_prior, freedom, proposals, burn, kept, most, corners, rng):
-    """``kept`` coefficient vectors, their numbers of corners, and which roughness each has.
-
-    ``always``: prior sigma of the first columns, which are in every set; ``size``: of a bend's
-    prior variance, to start from; ``corners``: columns in the set to start from.
-    Bends' own precisions and their size are drawn after every eighth proposal."""
-    alpha, beta = corner_prior[0], corner_prior[1]
-    columns = b.shape[1]
-    fixed = len(always)
-    free = columns - fixed
-    reach = 6  # of a split, in candidates
-    on = np.zeros(columns, np.bool_)
-    active, active2 = np.zeros(most, np.int64), np.zeros(most, np.int64)
-    precision, precision2 = np.zeros(most), np.zeros(most)
-    L, L2, z, z2, coefficient = (
-        np.zeros((most, most)),
-        np.zeros((most, most)),
-        np.zeros(most),
-        np.zeros(most),
-        np.zeros(most),
-    )
-    for i in range(fixed):
-        active[i], precision[i] = i, 1 / always[i] ** 2
-    count, level, variance = fixed, 0, size
-    for c in corners:
-        active[count], precision[count] = c, 1 / variance
-        if _marginal(G[level], b[level], active, count + 1, precision, L, z) > -np.inf:
-            on[c] = True
-            count += 1
-    now = _marginal(G[level], b[level], active, count, precision, L, z)
-    out, counts, levels = np.zeros((kept, columns)), np.zeros(kept, np.int64), np.zeros(kept, np.int64)
-    taken = 0
-    for n in range(proposals):
-        bends = count - fixed
-        kind = rng.random()
-        to, change, ratio, added, gone, gone2 = level, 0, 0.0, -1, -1, -1
-        new = 0  # corners proposed; 0: nothing
-        if kind < 0.15:  # born
-            c = fixed + int(rng.random() * free)
-            if not on[c] and count < most:
-                for i in range(count):
-                    active2[i], precision2[i] = active[i], precision[i]
-                active2[count] = c
-                precision2[count] = rng.gamma(freedom / 2) * 2 / freedom / variance
-                new, added = count + 1, c
-                ratio = math.log((alpha + bends) / (beta + free - bends - 1)) + math.log(free / (bends + 1.0))
-        elif kind < 0.30:  # removed
-            if bends > 0:
-                j = fixed + int(rng.random() * bends)
-                new, gone = _without(active, precision, count, j, active2, precision2), active[j]
-                ratio = -math.log((alpha + bends - 1) / (beta + free - bends)) - math.log(free / (1.0 * bends))
-        elif kind < 0.75:  # moved
-            if bends > 0:
-                j = fixed + int(rng.random() * bends)
-                far = rng.random()
-                d = 1 + int(rng.random() * (1 if far < 0.5 else (4 if far < 0.85 else 20)))
-                c = active[j] + (d if rng.random() < 0.5 else -d)
-                if fixed <= c < columns and not on[c]:
-                    new = _without(active, precision, count, j, active2, precision2) + 1
-                    active2[new - 1], precision2[new - 1] = c, precision[j]
-                    added, gone = c, active[j]
-        elif kind < 0.85:  # split in two
-            if bends > 0 and count < most:
-                j = fixed + int(rng.random() * bends)
-                left, right = active[j] - 1 - int(rng.random() * reach), active[j] + 1 + int(rng.random() * reach)
-                if left >= fixed and right < columns and not on[left] and not on[right]:
-                    new = _without(active, precision, count, j, active2, precision2) + 2
-                    active2[new - 2], precision2[new - 2] = left, precision[j]
-                    active2[new - 1] = right
-                    precision2[new - 1] = rng.gamma(freedom / 2) * 2 / freedom / variance
-                    added, gone, change = left, active[j], right
-                    ways = _between(left, right, reach, on, active[j])
-                    ratio = math.log((alpha + bends) / (beta + free - bends - 1))
-                    ratio += math.log(bends * reach * reach) - math.log((bends + 1.0) * bends * ways)
-        elif kind < 0.95:  # two merged
-            if bends > 1:
-                j, j2 = fixed + int(rng.random() * bends), fixed + int(rng.random() * bends)
-                left, right = active[j], active[j2]
-                if left < right <= left + 2 * reach:
-                    ways = _between(left, right, reach, on, -1)
-                    if ways > 0:
-                        pick, x = int(rng.random() * ways), left
-                        while pick >= 0:
-                            x += 1
-                            if x - left <= reach and right - x <= reach and not on[x]:
-                                pick -= 1
-                        new = _without(active, precision, count, j2, active2, precision2)
-                        for i in range(new):
-                            if active2[i] == left:
-                                active2[i] = x
-                        added, gone, gone2 = x, left, right
-                        ratio = -math.log((alpha + bends - 1) / (beta + free - bends))
-                        ratio += math.log(bends * (bends - 1.0) * ways) - math.log((bends - 1.0) * reach * reach)
-        elif n > burn // 4:  # another roughness; first the corners have to settle
-            to = int(rng.random() * len(evidence))
-            if to != level:
-                new = _without(active, precision, count, -1, active2, precision2)
-                ratio = evidence[to] + prior[to] - evidence[level] - prior[level]
-        if new > 0:
-            then = _marginal(G[to], b[to], active2, new, precision2, L2, z2)
-            if math.log(rng.random()) < then - now + ratio:
-                if gone >= 0:
-                    on[gone] = False
-                if gone2 >= 0:
-                    on[gone2] = False
-                if added >= 0:
-                    on[added] = True
-                if change > 0:
-                    on[change] = True
-                active, active2, precision, precision2 = active2, active, precision2, precision
-                L, L2, z, z2 = L2, L, z2, z
-                count, now, level = new, then, to
-        if n % 8 == 7:
-            for r in range(count - 1, -1, -1):
-                s = z[r] + rng.standard_normal()
-                for i in range(r + 1, count):
-                    s -= L[i, r] * coefficient[i]
-                coefficient[r] = s / L[r, r]
-            while taken < kept and (n - burn) * kept >= taken * (proposals - burn):
-                for i in range(count):
-                    out[taken, active[i]] = coefficient[i]
-                counts[taken], levels[taken] = count - fixed, level
-                taken += 1
-            spread = 0.0
-            for i in range(count):
-                precision2[i] = precision[i]
-            for i in range(fixed, count):
-                square = coefficient[i] ** 2
-                precision2[i] = rng.gamma((freedom + 1) / 2) / (0.5 * freedom + 0.5 * square / variance)
-                spread += square * precision2[i]
-            then = (size + 0.5 * spread) / rng.gamma(1.0 + 0.5 * (count - fixed))
-            for i in range(fixed, count):
-                precision2[i] /= then
-            after = _marginal(G[level], b[level], active, count, precision2, L2, z2)
-            if after > -np.inf:  # else rounding would decide: keep those before
-                now, variance = after, then
-                precision, precision2 = precision2, precision
-                L, L2, z, z2 = L2, L, z2, z
-    return out, counts, levels

@@ -34,7 +34,8 @@ from .density_peak import DrawnPeaks, draw_peaks
 from .density_result import Beside, DensityPeak, DensityResult, Noticed
 from .flyby_drag import PRINTED_SHAPE, DragAlong, flyby_drag
 from .on_times import gained
-from .result import AXES, spread
+from .peaks import spread
+from .result import AXES
 from .subject import slews, subject_of, thrusters_firing
 from .torque import disturbance_torque
 from .torque_on_times import torque_on_times

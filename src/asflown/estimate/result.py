@@ -5,41 +5,32 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import signal
 
 from ..kit.files import write_text
+from .peaks import PEAK_REACH_S, excursions, heights, spread
 from .whitened import AxisData
 
 AXES = ("x", "y", "z")
 
 
-#: Half of a peak's surroundings in which each drawn torque's own extremum is looked for: room for a doubtful corner's
-#: time.  Further out the highest of a rough torque's many is too high (of a cover's, by 5 % at 5 s, 0.6 % at 2.5 s). [s]
-PEAK_REACH_S = 2.5
-
-
-def spread(samples: np.ndarray) -> np.ndarray:
-    """One sigma of samples (K, ...) with tails: the mean of what their middle 68 % and 95 % each say of it.
-
-    A posterior of corners is narrow with long tails: its standard deviation is that of the tails, its
-    68 % interval that of the middle.  Normal samples give their standard deviation."""
-    low95, low68, high68, high95 = np.quantile(samples, [0.025, 0.1587, 0.8413, 0.975], axis=0)
-    return 0.25 * ((high68 - low68) + (high95 - low95) / 1.96)
-
-
 @dataclass(frozen=True)
 class Peak:
-    """One excursion: its time (seconds from the epoch), torque [N m], axis, and sigma where there is one."""
+    """One excursion: its time (seconds from the epoch), torque [N m], axis, and sigma and 95 % interval where there are any."""
 
     time_s: float
     torque_Nm: float
     axis: str
     sigma_Nm: float | None = None
+    interval_95_Nm: tuple[float, float] | None = None
+
+    def holds(self, torque_Nm: float) -> bool:
+        """Whether a height lies in the 95 % interval."""
+        return self.interval_95_Nm is not None and self.interval_95_Nm[0] <= torque_Nm <= self.interval_95_Nm[1]
 
     def record(self, with_axis: bool) -> dict:
         record: dict = {"time_s": self.time_s, "torque_Nm": self.torque_Nm}
         if self.sigma_Nm is not None:
-            record["sigma_Nm"] = self.sigma_Nm
+            record |= {"sigma_Nm": self.sigma_Nm, "interval_95_Nm": self.interval_95_Nm}
         return record | ({"axis": self.axis} if with_axis else {})
 
 
@@ -112,20 +103,27 @@ class TorqueResult:
             return value, None
         return value, float(spread(np.array([area(self.paths_time_s, p[:, j]) for p in self.paths_Nm])))
 
-    def peak_height(self, time_s: float, reach_s: float, axis: str) -> tuple[float, float | None]:
-        """Height of the excursion within ``reach_s`` of a time, and its sigma. [N m]
+    def peak(self, time_s: float, reach_s: float, axis: str) -> Peak:
+        """The excursion within ``reach_s`` of a time.
 
-        The mean over drawn torques of each one's own extremum: the extremum of a mean curve is lower,
-        since it is rounded by the doubt about where the corner is."""
+        Height is the mean over drawn torques of each one's own extremum: the extremum of a mean curve is lower,
+        since it is rounded by the doubt about where the corner is.  Sigma is these extrema's spread and the 95 % interval their
+        middle, both times what flights of the model itself say of them (``peak_scale``).  The interval is not two sigma either way: tips may be
+        rounder than they look, but hardly sharper."""
         j = AXES.index(axis)
         near = np.abs(self.time_s - time_s) <= reach_s
         mean = self.torque_Nm[near, j]
-        sign = np.sign(mean[np.argmax(np.abs(mean))])
+        sign = float(np.sign(mean[np.argmax(np.abs(mean))]))
         if self.paths_Nm is None:
-            return float(sign * np.max(sign * mean)), None
-        near = np.abs(self.paths_time_s - time_s) <= reach_s
-        heights = sign * np.max(sign * self.paths_Nm[:, near, j], axis=1)
-        return float(heights.mean()), float(spread(heights))
+            return Peak(time_s, sign * float(np.max(sign * mean)), axis)
+        drawn, scale = heights(self.paths_time_s, self.paths_Nm[:, :, j], time_s, reach_s, sign), self.peak_scale(axis)
+        low, middle, high = np.quantile(drawn, [0.025, 0.5, 0.975])
+        interval = float(middle + scale * (low - middle)), float(middle + scale * (high - middle))
+        return Peak(time_s, float(drawn.mean()), axis, scale * float(spread(drawn)), interval)
+
+    def peak_scale(self, axis: str) -> float:
+        """By what the spread of drawn peaks is multiplied about an axis, at least 1."""
+        return self.settings.get("torque", {}).get(axis, {}).get("peak_scale", 1.0)
 
     @property
     def unit(self) -> str:
@@ -210,6 +208,7 @@ class TorqueResult:
                 p["torque_per_spin_inertia_rad_s2"], p["torque_Nm"] = p["torque_Nm"], None
                 if "sigma_Nm" in p:
                     p["sigma_per_spin_inertia_rad_s2"], p["sigma_Nm"] = p["sigma_Nm"], None
+                    p["interval_95_per_spin_inertia_rad_s2"], p["interval_95_Nm"] = p["interval_95_Nm"], None
             for i in impulses:
                 i["impulse_per_spin_inertia_rad_s"], i["impulse_Nms"] = i["impulse_Nms"], None
                 i["sigma_per_spin_inertia_rad_s"], i["sigma_Nms"] = i["sigma_Nms"], None
@@ -227,20 +226,13 @@ def find_peaks(result: TorqueResult, axis: int) -> list[Peak]:
     sure = known if result.sigma_Nm is None else known & (np.abs(torque) > 4 * result.sigma_Nm[:, axis])
     if not sure.any():
         return []
-    threshold = 0.25 * np.max(np.abs(torque[sure]))
-    filled = np.where(known, torque, 0.0)
-    found: list[int] = []
-    for sign in (1, -1):
-        at, _ = signal.find_peaks(sign * filled, height=threshold, prominence=threshold)
-        found += at.tolist()
+    found = excursions(np.where(known, torque, 0.0), float(np.max(np.abs(torque[sure]))))
     peaks = []
-    for k in sorted(found):
+    for k in found:
         if sure[k]:
-            t = float(result.time_s[k])
-            drawn = (
-                (float(torque[k]), None) if result.paths_Nm is None else result.peak_height(t, PEAK_REACH_S, AXES[axis])
-            )
-            peaks.append(Peak(t, drawn[0], AXES[axis], drawn[1]))
+            t, name = float(result.time_s[k]), AXES[axis]
+            curve = Peak(t, float(torque[k]), name)
+            peaks.append(curve if result.paths_Nm is None else result.peak(t, PEAK_REACH_S, name))
     return peaks
 
 

@@ -31,8 +31,8 @@ from .latent import Body, Times, arrange, channel_of, without_known
 from .latent_free import FreeBody
 from .latent_loop import HeldBody
 from .levels import AxisFit, fit_doubts, fit_levels
+from .peaks import spread
 from .records import Record, gather
-from .result import spread
 from .subject import Grid, Subject
 from .whitened import AxisData
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .compare import best_lag, peak_near
-from .result import AXES, PEAK_REACH_S, TorqueResult
+from .peaks import PEAK_REACH_S
+from .result import AXES, TorqueResult
 
 #: 000 Tables 3 and 4: unsigned percent errors of T_Hrwa at the six peaks, as printed.
 PUBLISHED_PEAK_ERRORS = {
@@ -44,7 +45,7 @@ def against_truth(result: TorqueResult, time_s, torque_Nm, peaks, axis: str) -> 
     reach = float(np.min(np.diff(times))) / 2 if len(times) > 1 else 30.0
     found = [peak_near(result, j, t, reach) for t in times]
     if result.paths_Nm is not None:  # a posterior says more of a peak's height than its mean curve does
-        found = [(t, result.peak_height(t, PEAK_REACH_S, axis)[0]) for t, _ in found]
+        found = [(t, result.peak(t, PEAK_REACH_S, axis).torque_Nm) for t, _ in found]
     estimate = result.torque_Nm[:, j]
     true = np.interp(result.time_s, time_s, torque_Nm)
     lag, _ = best_lag(result.time_s, true, result.time_s, estimate)

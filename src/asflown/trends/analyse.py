@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..craft.model import Craft, Mechanism
-from ..estimate.result import AXES, TorqueResult, spread
+from ..estimate.peaks import spread
+from ..estimate.result import AXES, TorqueResult
 from ..estimate.torque import disturbance_torque
 from ..kit.errors import BadInput, some_of
 from ..kit.timeline import NS, utc_label

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from ..craft.model import Mechanism
-from ..estimate.result import spread
+from ..estimate.peaks import spread
 from ..kit.errors import BadInput
 from ..kit.plain import finite
 from ..telemetry.telemetry import Telemetry
