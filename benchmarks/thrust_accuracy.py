@@ -3,6 +3,7 @@
     python benchmarks/thrust_accuracy.py                  # 200 of each, some ten minutes on two cores
     python benchmarks/thrust_accuracy.py --runs 20
     python benchmarks/thrust_accuracy.py --alike          # thrusters all alike, the priors' 5 % not drawn
+    python benchmarks/thrust_accuracy.py --alike --unlike 0.002     # and the fit told so
 
 Every run has a fall time, a centre of mass, spin inertias, an inertia, a mass, thrusters unlike each other and a scatter
 from pulse to pulse (1 to 3 %) of its own.  The records: a wheel biasing like that of 28 January 2005, counters every 16 or 64 s, with and without
@@ -85,7 +86,7 @@ def thinned(tlm, count: int, counted: bool):
     return replace(tlm, channels=kept)
 
 
-def one(seed: int, alike: bool) -> dict:
+def one(seed: int, alike: bool, unlike: float) -> dict:
     """Errors and pulls of every case: mean thrust, the same against what flew, fall time, centre x and y, single thrusts."""
     flights, F, fall, center = flown(seed, alike)
     valve, found = Valve(0.005, 0.020, fall), {}
@@ -100,7 +101,7 @@ def one(seed: int, alike: bool) -> dict:
         ]
         steady, flew = impulse @ F / impulse.sum(), impulse.sum() / valve.effective(lengths).sum()
         records = [thinned(flights[k].telemetry, count, counted) for k in keys]
-        r = thrust(records, BASE, priors=priors_for(BASE, mass_kg=MASS))
+        r = thrust(records, BASE, priors=priors_for(BASE, mass_kg=MASS, unlike=unlike))
         singles = [(r.thrust_N[t.name] - f) / r.sigma_N[t.name] for t, f in zip(BASE.thrusters, F, strict=True) if r.thrust_N[t.name] is not None]  # fmt: skip
         errors = np.array([r.mean_thrust_N - steady, r.mean_thrust_N - flew, r.fall_time_s - fall, *(np.array(r.center_m) - center)[:2]])  # fmt: skip
         sigmas = np.array([r.mean_sigma_N, r.mean_sigma_N, r.fall_time_sigma_s, *r.center_sigma_m[:2]])
@@ -112,10 +113,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--alike", action="store_true", help="all thrusters alike")
+    parser.add_argument("--unlike", type=float, default=UNLIKE, help="what the fit is told of how unlike they are")
     parser.add_argument("--jobs", type=int, default=2)
     wanted = parser.parse_args()
     with ProcessPoolExecutor(wanted.jobs) as pool:
-        runs = list(pool.map(partial(one, alike=wanted.alike), range(wanted.runs)))
+        runs = list(pool.map(partial(one, alike=wanted.alike, unlike=wanted.unlike), range(wanted.runs)))
     print(
         f"{wanted.runs} runs; error and scatter of the mean in % of the thrust; pulls: mean thrust, fall time, centre x, y, each thruster"
     )
