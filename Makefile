@@ -3,6 +3,10 @@ PYTHON ?= python3
 V := .venv
 BIN := $(V)/bin
 
+# matrices here have ten rows: threads of the linear algebra only get in each other's way
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+
 .PHONY: setup demo test slow bench check clean
 .DEFAULT_GOAL := setup
 

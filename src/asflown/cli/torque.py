@@ -72,6 +72,8 @@ def torque(
     check_picture(plot)
     ship = craft_from(craft, inertia, cm)
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
+    if impulse is not None:  # before the work; the torque's own span may be shorter, and is asked again
+        _span_of(impulse, *telemetry.seconds(telemetry.span()))
     mechanism = None if moving == "none" else moving
     considered = _sigmas(consider)
     # seconds for an event, minutes for an orbit at 1 Hz: say that something happens, to a terminal only
@@ -142,23 +144,27 @@ def _sigmas(text: str | None) -> dict[str, float] | None:
     return found
 
 
-def _with_impulse(result, text: str):
-    """The result with the angular impulse of a span about every axis asked for."""
-    from dataclasses import replace
-
+def _span_of(text: str, first_s: float, last_s: float) -> tuple[float, float]:
+    """'60,141' -> two times within a record. [s]"""
     from asflown.kit.errors import BadInput
 
     from .options import numbers_of
 
     span = numbers_of(text, "--impulse")
-    first, last = result.time_s[0], result.time_s[-1]
-    if len(span) != 2 or not first <= span[0] < span[1] <= last:
+    if len(span) != 2 or not first_s <= span[0] < span[1] <= last_s:
         raise BadInput(
             f"--impulse {text!r} is not a span of this result",
-            remedy=f"Give two times between {first:g} and {last:g} s from the epoch, the earlier first.",
+            remedy=f"Give two times between {first_s:g} and {last_s:g} s from the epoch, the earlier first.",
         )
-    found = [(span[0], span[1], "xyz"[j], *result.impulse(span[0], span[1], "xyz"[j])) for j in result.axes]
-    return replace(result, impulses=tuple(found))
+    return span[0], span[1]
+
+
+def _with_impulse(result, text: str):
+    """The result with the angular impulse of a span about every axis asked for."""
+    from dataclasses import replace
+
+    span = _span_of(text, result.time_s[0], result.time_s[-1])
+    return replace(result, impulses=tuple((*span, "xyz"[j], *result.impulse(*span, "xyz"[j])) for j in result.axes))
 
 
 def _others(telemetry, ship, result, mechanism):

@@ -25,7 +25,7 @@ from ..kit.ensemble import Gains, gains, paths, simulate, whiten
 from ..kit.smoother import Measurements
 from .corner_sampler import sample
 from .latent import Body, Levels, Posterior, Times, response
-from .peaks import peak_scale
+from .peaks import excursions, peak_scale, spread
 
 #: Sizes of the roughness as shares of the torque's own size near that time, and time scales, short of what the telemetry
 #: resolves (studies/corners.py). [1], [s]
@@ -184,9 +184,11 @@ def draw_torques(
         "smooth_probability": float(np.mean(which == len(ways) - 1)),
         "explained": bool(explained),
     }
-    if explained and as_lines < _SURE_OF_LINES:
+    shown = times.wanted
+    peaks = excursions(mean[shown], spread(torque[:, shown]))
+    if explained and as_lines < _SURE_OF_LINES and len(peaks):
         true, flown = _flown_again(search, ways, levels, data, bends, which, torque)
-        settings["peak_scale"] = peak_scale(times.seconds[times.wanted], mean[times.wanted], true, flown)
+        settings["peak_scale"] = peak_scale(times.seconds[shown], mean[shown], peaks, true, flown)
     return Posterior(mean, torque, bends[:, 2:fixed], left, settings)
 
 

@@ -20,6 +20,8 @@ from scipy import signal
 PEAK_REACH_S = 2.5
 #: An excursion stands out from its surroundings by this share of the largest torque.
 STANDS_OUT = 0.25
+#: And its height is this many of its sigmas.
+SURE = 4.0
 #: Share of pulls within one sigma of a normal distribution.
 _ONE_SIGMA = 0.6827
 
@@ -33,11 +35,18 @@ def spread(samples: np.ndarray) -> np.ndarray:
     return 0.25 * ((high68 - low68) + (high95 - low95) / 1.96)
 
 
-def excursions(torque: np.ndarray, largest: float) -> np.ndarray:
-    """Indices of the excursions of either sign of a torque (M,) that stand out against its largest. [N m]"""
-    least = STANDS_OUT * largest
-    found = [signal.find_peaks(sign * torque, height=least, prominence=least)[0] for sign in (1, -1)]
-    return np.sort(np.concatenate(found))
+def excursions(torque: np.ndarray, sigma: np.ndarray | None = None) -> np.ndarray:
+    """Indices of the excursions of either sign of a torque (M,), NaN where unknown. [N m]
+
+    They are above SURE times their sigma (M,), if there is one, and stand out from their surroundings by a share of the largest of these."""
+    known = np.isfinite(torque)
+    sure = known if sigma is None else known & (np.abs(torque) > SURE * sigma)
+    if known.sum() < 3 or not np.any(torque[sure]):
+        return np.empty(0, np.intp)
+    least, filled = STANDS_OUT * np.max(np.abs(torque[sure])), np.where(known, torque, 0.0)
+    found = [signal.find_peaks(sign * filled, height=least, prominence=least)[0] for sign in (1, -1)]
+    at = np.sort(np.concatenate(found))
+    return at[sure[at]]
 
 
 def heights(time_s: np.ndarray, torques: np.ndarray, at_s: float, reach_s: float, sign: float) -> np.ndarray:
@@ -46,14 +55,15 @@ def heights(time_s: np.ndarray, torques: np.ndarray, at_s: float, reach_s: float
     return sign * np.max(sign * torques[..., near], axis=-1)
 
 
-def peak_scale(time_s: np.ndarray, mean: np.ndarray, true: np.ndarray, drawn: np.ndarray) -> float:
-    """By what the sigma of this torque's peaks is to be multiplied, at least 1; 1 where it has none.
+def peak_scale(time_s: np.ndarray, mean: np.ndarray, at: np.ndarray, true: np.ndarray, drawn: np.ndarray) -> float:
+    """By what the sigma of this torque's peaks is to be multiplied, at least 1.
 
-    ``mean``: (M,), whose peaks are meant; ``true``: (F, M), torques that were flown; ``drawn``: (F, K, M), drawn from each one's telemetry."""
+    ``mean``: (M,), whose excursions ``at`` (P,) are meant; ``true``: (F, M), torques that were flown; ``drawn``: (F, K, M), drawn
+    from each one's telemetry."""
     pulls = []
-    for k in excursions(mean, float(np.max(np.abs(mean)))):
+    for k in at:
         sign = float(np.sign(mean[k]))
         was = heights(time_s, true, time_s[k], PEAK_REACH_S, sign)
         found = heights(time_s, drawn, time_s[k], PEAK_REACH_S, sign)
         pulls.append(np.abs(found.mean(axis=1) - was) / spread(found.T))
-    return max(1.0, float(np.quantile(pulls, _ONE_SIGMA))) if pulls else 1.0
+    return max(1.0, float(np.quantile(pulls, _ONE_SIGMA)))

@@ -219,21 +219,11 @@ class TorqueResult:
 
 def find_peaks(result: TorqueResult, axis: int) -> list[Peak]:
     """Excursions that stand out: prominence above a quarter of the largest, height above 4 sigma at that instant."""
-    torque = result.torque_Nm[:, axis]
-    known = np.isfinite(torque)
-    if known.sum() < 3 or not np.any(torque[known]):
-        return []
-    sure = known if result.sigma_Nm is None else known & (np.abs(torque) > 4 * result.sigma_Nm[:, axis])
-    if not sure.any():
-        return []
-    found = excursions(np.where(known, torque, 0.0), float(np.max(np.abs(torque[sure]))))
-    peaks = []
-    for k in found:
-        if sure[k]:
-            t, name = float(result.time_s[k]), AXES[axis]
-            curve = Peak(t, float(torque[k]), name)
-            peaks.append(curve if result.paths_Nm is None else result.peak(t, PEAK_REACH_S, name))
-    return peaks
+    torque, name = result.torque_Nm[:, axis], AXES[axis]
+    at = excursions(torque, None if result.sigma_Nm is None else result.sigma_Nm[:, axis])
+    if result.paths_Nm is None:
+        return [Peak(float(result.time_s[k]), float(torque[k]), name) for k in at]
+    return [result.peak(float(result.time_s[k]), PEAK_REACH_S, name) for k in at]
 
 
 def _value(peak: Peak) -> str:
