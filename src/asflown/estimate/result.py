@@ -145,7 +145,7 @@ class TorqueResult:
             band = "" if self.sigma_Nm is None else f"   1 sigma {np.nanmedian(self.sigma_Nm[:, j]):.2g}"
             lines.append(f"  {AXES[j]}   mean {np.nanmean(t):+.3g}   rms {np.sqrt(np.nanmean(t**2)):.3g}{band}")
             peaks = find_peaks(self, j)
-            lines += [f"      peak {_value(p)} at {p.time_s:.0f} s" for p in peaks[:12]]
+            lines += [f"      peak at {p.time_s:5.0f} s  {_value(p)}" for p in peaks[:12]]
             if len(peaks) > 12:
                 lines.append(f"      and {len(peaks) - 12} more peaks")
         for f in self.fits:
@@ -227,7 +227,10 @@ def find_peaks(result: TorqueResult, axis: int) -> list[Peak]:
 
 
 def _value(peak: Peak) -> str:
-    return f"{peak.torque_Nm:+.4g}" + ("" if peak.sigma_Nm is None else f" +- {peak.sigma_Nm:.2g}")
+    if peak.sigma_Nm is None or peak.interval_95_Nm is None:
+        return f"{peak.torque_Nm:+.4g}"
+    low, high = peak.interval_95_Nm
+    return f"{peak.torque_Nm:+.4g} +- {peak.sigma_Nm:.2g}  95 %: {low:+.4g} to {high:+.4g}"
 
 
 def save_csv(result: TorqueResult, path, provenance: dict) -> None:
