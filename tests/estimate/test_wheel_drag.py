@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from asflown.craft.load import load_craft
@@ -287,6 +287,7 @@ def test_property_use_of_a_wheel_on_a_straight_line(first, slope, steps, low):
     """Revolutions, dwell and crossings against their closed forms, whatever the sampling."""
     from asflown.estimate.wheel_use import wheel_use
 
+    assume(abs(slope) > 1e-6 or abs(abs(first) - low) > 1e-6)  # along the limit itself either answer is right
     t = np.concatenate([[0.0], np.cumsum(steps)])
     w = first + slope * t
     c = telemetry({"wheel_rate_RWA1": (t, w)}).channel("wheel_rate_RWA1")

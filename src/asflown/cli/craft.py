@@ -117,5 +117,6 @@ def _record(c, now, at) -> dict:
             "filter_damping": c.wheel_controller.rate_filter.damping, "period_s": c.wheel_controller.period,
         },
         "center_of_mass_m": c.center_of_mass,
+        "center_of_mass_assumed_m": c.center_of_mass_assumed,
         "doubts": list(now.doubts),
     }  # fmt: skip

@@ -48,7 +48,9 @@ def leak(
         None, "--pulse-scatter", help="One sigma of one pulse against another, as a share; 0.03."
     ),
     cm: str = CM,
-    cm_sigma: str = typer.Option(None, "--cm-sigma", help='Its sigma, "0.02 0.02 0.02 m" unless given.'),
+    cm_sigma: str = typer.Option(
+        None, "--cm-sigma", help='Its sigma; "0.02 0.02 0.02 m", or "0.1 0.1 0.5 m" without --cm.'
+    ),
     inertia: str = INERTIA,
     inertia_sigma: float = INERTIA_SIGMA,
     spin_sigma: float = SPIN_SIGMA,
@@ -84,6 +86,7 @@ def leak(
         thrust_N=None if thrust is None else quantity(thrust, "N"),
         momentum_Nms=momentum,
         known=known_for(
+            ship,
             thrust_share=thrust_sigma,
             each_share=unlike,
             pulse_share=pulse_scatter,

@@ -341,6 +341,7 @@ class Craft(_Data):
     accelerometer: Accelerometer | None = None
     aerodynamics: Aerodynamics | None = None
     center_of_mass: MetreVector | None = None
+    center_of_mass_assumed: MetreVector | None = None  # a likely place, where none is known
     alternatives: dict[str, Alternative] = Field(default_factory=dict)
 
     @model_validator(mode="after")
@@ -369,6 +370,14 @@ class Craft(_Data):
     @property
     def wheel_names(self) -> list[str]:
         return list(dict.fromkeys(w.name for w in self.wheels))
+
+    @property
+    def likely_center(self) -> tuple[float, float, float]:
+        """Centre of mass as known, else as assumed, else the middle of the thrusters. [m]"""
+        if (center := self.center_of_mass or self.center_of_mass_assumed) is not None:
+            return center
+        x, y, z = np.mean([t.position for t in self.thrusters], axis=0)
+        return float(x), float(y), float(z)
 
     def mechanism(self, name: str) -> Mechanism:
         for m in self.mechanisms:

@@ -23,10 +23,11 @@ from .leak_doubts import branch_doubts, loss_doubt, noise_doubts, pointing_doubt
 from .leak_error_monitor import ErrorMonitor, error_monitor, threshold_at_rate
 from .leak_filter import Evidence, Monitor, threshold_for
 from .leak_firing import geometry_of
-from .leak_known import Known
+from .leak_known import Known, known_for
 from .leak_result import LeakResult
 from .leak_samples import Noise, Steps, learned_noise, steps_of
 from .subject import Subject, subject_of
+from .thrust_priors import center_doubt
 from .thruster_branch import other_branch
 from .uncounted import PULSES, gained_idle, pulse_Nms, uncounted
 from .wheel_limits import stopped
@@ -45,7 +46,7 @@ _SURE = 0.95  # posterior below which the thruster named is doubted
 def leak(telemetry: Telemetry, craft: Craft, **options) -> LeakResult:
     """Whether a thruster leaks or is weak in a record.  Options are those of ``LeakWatch``.
 
-    Raises BadInput for a craft without thrusters, centre of mass, inertia or spin inertia, and for channels missing."""
+    Raises BadInput for a craft without thrusters, centre of mass (known or assumed), inertia or spin inertia, and for channels missing."""
     watch = LeakWatch(craft, **options)
     watch.take(telemetry, final=True)
     return watch.result()
@@ -84,7 +85,7 @@ class LeakWatch:
         ):  # fmt: skip
             if value is not None and not 0 < value < np.inf:
                 raise BadInput(f"a {what} of {value:g} is not positive", remedy="Give a number above zero.")
-        self.craft, self.method, self.known = craft, method, known or Known()
+        self.craft, self.method, self.known = craft, method, known or known_for(craft)
         self.rate, self.window_s, self._thrust_N, self._momentum_Nms = (
             false_alarms_per_hour,
             window_s,
@@ -147,7 +148,10 @@ class LeakWatch:
             ("kind", "thruster", "posterior", "onset_s", "onset_95_s", "torque_Nm", "torque_sigma_Nm", "leak_N",
              "leak_sigma_N", "loss", "loss_sigma", "together")
         )  # fmt: skip
-        doubts = [*view.subject.doubts, *steps.doubts, *noise_doubts(self._noise, steps)]
+        doubts = (
+            [] if self.craft.center_of_mass is not None else [center_doubt(self.craft, self.known.center_of_mass_m)]
+        )
+        doubts += [*view.subject.doubts, *steps.doubts, *noise_doubts(self._noise, steps)]
         if self._thrust_N is None and steps.ordered.any():
             doubts += thrust_doubts(tlm.epoch_ns, self.craft)
         if at_window is None:
@@ -190,7 +194,7 @@ class LeakWatch:
             taken_as_known=str(self.known),
             settings={
                 "thrust_N": view.thrust_N,
-                "center_of_mass_m": self.craft.center_of_mass,
+                "center_of_mass_m": self.craft.likely_center,
                 "inertia_kg_m2": view.subject.inertia_kgm2,
                 "one_sigma_of_what_is_known": self.known.record(),
             },

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
 
+from ..craft.model import Craft
 from ..kit.errors import BadInput
+from .thrust_priors import CENTER_SIGMA
 
 _HOUR_S = 3600.0
 
@@ -16,7 +18,7 @@ class Known:
     thrust_share: float = 0.10  # of all thrusters together: blow-down, and fall time (13 of 170 ms a pulse)
     each_share: float = 0.03  # of one against the others
     pulse_share: float = 0.03  # of one pulse against another (001: 1 to 3 %)
-    center_of_mass_m: tuple[float, float, float] = (0.02, 0.02, 0.02)
+    center_of_mass_m: tuple[float, float, float] = (0.02, 0.02, 0.02)  # an assumed one: CENTER_SIGMA
     inertia_share: float = 0.01  # 001 Table 1
     spin_share: float = 0.0024  # 001: 0.161 for 0.16138
     torque_Nm: float = 3e-6  # from outside, steady; 001 Table A1: 2.11 uN m
@@ -51,8 +53,8 @@ OPTIONS = {
 }
 
 
-def known_for(**said) -> Known:
-    """The defaults, with what the user says instead (None: nothing).  Raises BadInput for a sigma that is none."""
+def known_for(craft: Craft, **said) -> Known:
+    """The defaults for a craft, with what the user says instead (None: nothing).  Raises BadInput for a sigma that is none."""
     given = {k: v for k, v in said.items() if v is not None}
     for name, value in given.items():
         for v in value if isinstance(value, (tuple, list)) else [value]:
@@ -63,4 +65,6 @@ def known_for(**said) -> Known:
                 )
     if "center_of_mass_m" in given:
         given["center_of_mass_m"] = tuple(given["center_of_mass_m"])
+    elif craft.center_of_mass is None:
+        given["center_of_mass_m"] = CENTER_SIGMA
     return replace(Known(), **given)

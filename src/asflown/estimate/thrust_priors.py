@@ -57,6 +57,13 @@ class Priors:
         )
 
 
+def center_doubt(craft: Craft, sigma_m) -> str:
+    """That the centre of mass is not known, and what is taken."""
+    meters, place = (", ".join(f"{v:g}" for v in x) for x in (sigma_m, craft.likely_center))
+    where = "the middle of the thrusters is taken" if craft.center_of_mass_assumed is None else f"{place} m is assumed"
+    return f"the centre of mass is not known: {where}, to {meters} m. Give --cm"
+
+
 def priors_for(
     craft: Craft,
     *,
@@ -96,22 +103,14 @@ def priors_for(
     if center_sigma_m is not None and not min(center_sigma_m) > 0:
         raise BadInput("a sigma of the centre of mass is not positive", remedy="Give three lengths above zero.")
     own = [t.fall for t in craft.thrusters if t.fall > 0]
-    doubts = []
-    if craft.center_of_mass is None:
-        middle = np.mean([t.position for t in craft.thrusters], axis=0)
-        center, sigma = (float(middle[0]), float(middle[1]), float(middle[2])), CENTER_UNKNOWN
-        doubts.append(
-            "the centre of mass is not known: the middle of the thrusters is taken, to "
-            + ", ".join(f"{v:g}" for v in (center_sigma_m or sigma))
-            + " m. Give --cm"
-        )
-    else:
-        center, sigma = craft.center_of_mass, CENTER_SIGMA
+    nowhere = craft.center_of_mass is None and craft.center_of_mass_assumed is None
+    center_sigma_m = tuple(center_sigma_m or (CENTER_UNKNOWN if nowhere else CENTER_SIGMA))
+    doubts = [] if craft.center_of_mass is not None else [center_doubt(craft, center_sigma_m)]
     return Priors(
         fall_s=fall_s if fall_s is not None else (float(np.mean(own)) if own else FALL),
         fall_sigma_s=fall_sigma_s if fall_sigma_s is not None else FALL_SIGMA,
-        center_m=center,
-        center_sigma_m=tuple(center_sigma_m) if center_sigma_m is not None else sigma,
+        center_m=craft.likely_center,
+        center_sigma_m=center_sigma_m,
         pulse_scatter=PULSE_SCATTER if pulse_scatter is None else pulse_scatter,
         unlike=UNLIKE if unlike is None else unlike,
         spin_share=SPIN_SHARE if spin_share is None else spin_share,

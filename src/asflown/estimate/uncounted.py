@@ -38,9 +38,8 @@ def gained_idle(momentum: np.ndarray, body: np.ndarray) -> float:
 def pulse_Nms(craft: Craft, thrusters: Sequence[Thruster], step_s: float, tai_ns: int) -> float:
     """What a pulse of one control step turns the craft by, of the thruster with the longest arm. [N m s]"""
     thrust = craft.thrust_at(tai_ns) if craft.thrust_history else float(np.mean([t.nominal_thrust for t in thrusters]))
-    center = craft.center_of_mass or tuple(np.mean([t.position for t in thrusters], axis=0))
     arms = np.linalg.norm(
-        moment_matrix([t.position for t in thrusters], [t.direction for t in thrusters], center), axis=0
+        moment_matrix([t.position for t in thrusters], [t.direction for t in thrusters], craft.likely_center), axis=0
     )
     mean = Valve(*(float(np.mean([getattr(t, k) for t in thrusters])) for k in ("delay", "rise", "fall")))
     own = Valve(mean.delay_s, mean.rise_s or 1e-6, mean.fall_s)
