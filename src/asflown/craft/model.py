@@ -372,10 +372,15 @@ class Craft(_Data):
         return list(dict.fromkeys(w.name for w in self.wheels))
 
     @property
+    def stated_center(self) -> tuple[float, float, float] | None:
+        """Centre of mass as known, else as assumed. [m]"""
+        return self.center_of_mass or self.center_of_mass_assumed
+
+    @property
     def likely_center(self) -> tuple[float, float, float]:
-        """Centre of mass as known, else as assumed, else the middle of the thrusters. [m]"""
-        if (center := self.center_of_mass or self.center_of_mass_assumed) is not None:
-            return center
+        """Centre of mass as stated, else the middle of the thrusters. [m]"""
+        if self.stated_center is not None:
+            return self.stated_center
         x, y, z = np.mean([t.position for t in self.thrusters], axis=0)
         return float(x), float(y), float(z)
 

@@ -184,11 +184,12 @@ def draw_torques(
         "smooth_probability": float(np.mean(which == len(ways) - 1)),
         "explained": bool(explained),
     }
-    shown = times.wanted
-    peaks = excursions(mean[shown], spread(torque[:, shown]))
-    if explained and as_lines < _SURE_OF_LINES and len(peaks):
-        true, flown = _flown_again(search, ways, levels, data, bends, which, torque)
-        settings["peak_scale"] = peak_scale(times.seconds[shown], mean[shown], peaks, true, flown)
+    if explained and as_lines < _SURE_OF_LINES:
+        shown = times.wanted
+        peaks = excursions(mean[shown], spread(torque[:, shown]))
+        if len(peaks):
+            true, flown = _flown_again(search, ways, levels, data, bends, which, torque)
+            settings["peak_scale"] = peak_scale(times.seconds[shown], mean[shown], peaks, true, flown)
     return Posterior(mean, torque, bends[:, 2:fixed], left, settings)
 
 

@@ -27,7 +27,7 @@ from .leak_known import Known, known_for
 from .leak_result import LeakResult
 from .leak_samples import Noise, Steps, learned_noise, steps_of
 from .subject import Subject, subject_of
-from .thrust_priors import center_doubt
+from .thrust_priors import center_doubts
 from .thruster_branch import other_branch
 from .uncounted import PULSES, gained_idle, pulse_Nms, uncounted
 from .wheel_limits import stopped
@@ -148,10 +148,8 @@ class LeakWatch:
             ("kind", "thruster", "posterior", "onset_s", "onset_95_s", "torque_Nm", "torque_sigma_Nm", "leak_N",
              "leak_sigma_N", "loss", "loss_sigma", "together")
         )  # fmt: skip
-        doubts = (
-            [] if self.craft.center_of_mass is not None else [center_doubt(self.craft, self.known.center_of_mass_m)]
-        )
-        doubts += [*view.subject.doubts, *steps.doubts, *noise_doubts(self._noise, steps)]
+        doubts = [*center_doubts(self.craft, self.known.center_of_mass_m), *view.subject.doubts, *steps.doubts]
+        doubts += noise_doubts(self._noise, steps)
         if self._thrust_N is None and steps.ordered.any():
             doubts += thrust_doubts(tlm.epoch_ns, self.craft)
         if at_window is None:
@@ -194,7 +192,7 @@ class LeakWatch:
             taken_as_known=str(self.known),
             settings={
                 "thrust_N": view.thrust_N,
-                "center_of_mass_m": self.craft.likely_center,
+                "center_of_mass_m": self.craft.stated_center,
                 "inertia_kg_m2": view.subject.inertia_kgm2,
                 "one_sigma_of_what_is_known": self.known.record(),
             },

@@ -42,7 +42,7 @@ def geometry_of(craft: Craft) -> Geometry:
         raise BadInput(
             f"{craft.name} has no thrusters", remedy="Describe them under [[thrusters]] in the craft's file."
         )
-    if craft.center_of_mass is None and craft.center_of_mass_assumed is None:
+    if craft.stated_center is None:
         raise BadInput(
             f"{craft.name}'s centre of mass is not known, and thrusters turn it about that",
             remedy='Give it: --cm "x,y,z" in m, in the axes of the thrusters\' positions.',
@@ -51,7 +51,7 @@ def geometry_of(craft: Craft) -> Geometry:
     period = craft.wheel_controller.period if craft.wheel_controller else _SHORTEST_PULSE
     return Geometry(
         names=tuple(t.name for t in craft.thrusters),
-        columns=moment_matrix([t.position for t in craft.thrusters], along, craft.likely_center),
+        columns=moment_matrix([t.position for t in craft.thrusters], along, craft.stated_center),
         directions=along.T,
         delay_s=np.array([t.delay for t in craft.thrusters]),
         rise_s=np.array([t.rise for t in craft.thrusters]),

@@ -19,9 +19,9 @@ from scipy import signal
 #: time.  Further out the highest of a rough torque's many is too high (of a cover's, by 5 % at 5 s, 0.6 % at 2.5 s). [s]
 PEAK_REACH_S = 2.5
 #: An excursion stands out from its surroundings by this share of the largest torque.
-STANDS_OUT = 0.25
+_STANDS_OUT = 0.25
 #: And its height is this many of its sigmas.
-SURE = 4.0
+_SURE = 4.0
 #: Share of pulls within one sigma of a normal distribution.
 _ONE_SIGMA = 0.6827
 
@@ -38,12 +38,12 @@ def spread(samples: np.ndarray) -> np.ndarray:
 def excursions(torque: np.ndarray, sigma: np.ndarray | None = None) -> np.ndarray:
     """Indices of the excursions of either sign of a torque (M,), NaN where unknown. [N m]
 
-    They are above SURE times their sigma (M,), if there is one, and stand out from their surroundings by a share of the largest of these."""
+    They are above four times their sigma (M,), if there is one, and stand out from their surroundings by a share of the largest of these."""
     known = np.isfinite(torque)
-    sure = known if sigma is None else known & (np.abs(torque) > SURE * sigma)
+    sure = known if sigma is None else known & (np.abs(torque) > _SURE * sigma)
     if known.sum() < 3 or not np.any(torque[sure]):
         return np.empty(0, np.intp)
-    least, filled = STANDS_OUT * np.max(np.abs(torque[sure])), np.where(known, torque, 0.0)
+    least, filled = _STANDS_OUT * np.max(np.abs(torque[sure])), np.where(known, torque, 0.0)
     found = [signal.find_peaks(sign * filled, height=least, prominence=least)[0] for sign in (1, -1)]
     at = np.sort(np.concatenate(found))
     return at[sure[at]]

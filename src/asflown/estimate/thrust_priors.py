@@ -57,11 +57,13 @@ class Priors:
         )
 
 
-def center_doubt(craft: Craft, sigma_m) -> str:
-    """That the centre of mass is not known, and what is taken."""
+def center_doubts(craft: Craft, sigma_m) -> list[str]:
+    """That the centre of mass is not known, and what is taken; nothing where it is known."""
+    if craft.center_of_mass is not None:
+        return []
     meters, place = (", ".join(f"{v:g}" for v in x) for x in (sigma_m, craft.likely_center))
     where = "the middle of the thrusters is taken" if craft.center_of_mass_assumed is None else f"{place} m is assumed"
-    return f"the centre of mass is not known: {where}, to {meters} m. Give --cm"
+    return [f"the centre of mass is not known: {where}, to {meters} m. Give --cm"]
 
 
 def priors_for(
@@ -103,9 +105,7 @@ def priors_for(
     if center_sigma_m is not None and not min(center_sigma_m) > 0:
         raise BadInput("a sigma of the centre of mass is not positive", remedy="Give three lengths above zero.")
     own = [t.fall for t in craft.thrusters if t.fall > 0]
-    nowhere = craft.center_of_mass is None and craft.center_of_mass_assumed is None
-    center_sigma_m = tuple(center_sigma_m or (CENTER_UNKNOWN if nowhere else CENTER_SIGMA))
-    doubts = [] if craft.center_of_mass is not None else [center_doubt(craft, center_sigma_m)]
+    center_sigma_m = tuple(center_sigma_m or (CENTER_UNKNOWN if craft.stated_center is None else CENTER_SIGMA))
     return Priors(
         fall_s=fall_s if fall_s is not None else (float(np.mean(own)) if own else FALL),
         fall_sigma_s=fall_sigma_s if fall_sigma_s is not None else FALL_SIGMA,
@@ -117,5 +117,5 @@ def priors_for(
         inertia_share=INERTIA_SHARE if inertia_share is None else inertia_share,
         mass_kg=mass_kg,
         mass_share=MASS_SHARE if mass_share is None else mass_share,
-        doubts=tuple(doubts),
+        doubts=tuple(center_doubts(craft, center_sigma_m)),
     )
