@@ -32,6 +32,13 @@ def test_a_long_sweep_still_holds_all_pulses():
     assert plan.duration >= 60 + 6 * 120
 
 
+def test_a_budget_passes_on_what_its_results_doubt():
+    """e5 is held by thrusters, whose torque counts as the surroundings': every flight's result says so."""
+    (row,) = error_budget("e5", CASSINI, ["momentum"], runs=2)
+    assert any("thrusters fire in this record" in d for d in row.doubts)
+    assert all(d.endswith("of 2 flights)") for d in row.doubts)
+
+
 def test_what_cannot_be_budgeted_is_refused():
     for name in ("magic", "fused-printed", "momentum-best"):
         with pytest.raises(BadInput, match="not known"):

@@ -22,8 +22,6 @@ from cli.program import complaint, run
 CASSINI = load_craft("cassini")
 E3 = flyby_called("E3")
 CLOSEST_S = 180.0
-#: The record ends 1260 km from the jets, 99 s after closest approach: well within eq 26's reach.
-STOP_S = CLOSEST_S + 98
 TRUTH = {"Alexandria": 0.55e-12, "Cairo": 10.3e-12, "Damascus": 8.5e-12}  # 004 Table 3; all 0.36 rad wide
 
 
@@ -33,7 +31,7 @@ def flown(seed=3, exponent=1, noise="nominal"):
     f = fly(
         "quiet", craft=CASSINI, epoch="2008-03-12T19:03:12", duration="480 s", seed=seed, noise=noise, torques=[plume]
     )
-    return f.telemetry.between(0, STOP_S)
+    return f.telemetry
 
 
 def fitted(seed=3, exponent=1, noise="nominal", **how):
@@ -123,7 +121,7 @@ def test_evidence_prefers_what_the_data_carry():
     r = fitted()
     assert r.scores[0].bic == 0 and r.scores[0].free < 7 and len(r.scores) == 3 + 2 * 4
     assert any("fewer parameters" in d for d in r.doubts)
-    assert {s.names for s in r.scores[-3:]} <= {("Alexandria",), ("Cairo",), ("Damascus",), ("Alexandria", "Damascus")}
+    assert not any({"Cairo", "Damascus"} <= set(s.names) for s in r.scores[-3:])
 
 
 # ---- through the loop, as printed, other sources ------------------------------------------------------------
@@ -165,6 +163,26 @@ def test_a_loop_that_is_not_as_described_is_not_used():
     assert any("as the craft file describes it is not used" in d for d in r.doubts)
     for s in r.sources[1:]:
         assert s.jet.density_kgm3 == pytest.approx(TRUTH[s.jet.name], rel=0.15)
+
+
+def test_recovery_through_the_loop_from_a_record_that_runs_on():
+    """What is measured after the plume's reach is no part of the fit: cut there, the record says the same."""
+    whole, cut = (
+        jets(t, CASSINI, "E3", CLOSEST_S, widths="common", fit="forward")
+        for t in (flown(4), flown(4).between(0, CLOSEST_S + 103))
+    )
+    for s, c in zip(whole.sources, cut.sources, strict=True):
+        low, high = s.density_95
+        assert low <= TRUTH[s.jet.name] <= high
+        assert abs(s.jet.density_kgm3 - c.jet.density_kgm3) < 0.5 * np.diff(c.density_95)
+    assert whole.rms == pytest.approx(1, abs=0.15) and not any("do not explain" in d for d in whole.doubts)
+
+
+def test_none_is_identified_where_jets_do_not_explain_the_telemetry():
+    """Of three jets Alexandria alone is asked for."""
+    r = jets(flown(), CASSINI, "E3", CLOSEST_S, names=["Alexandria"], fit="forward")
+    assert any("so none is identified" in d for d in r.doubts)
+    assert not any(s.density_known or s.width_known for s in r.sources)
 
 
 def test_the_printed_fit_is_a_simplex_without_intervals():

@@ -6,8 +6,10 @@ the Monte-Carlo error that the number of flights leaves it.
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,6 +27,8 @@ DEFAULT_METHODS = ("momentum-printed", "transfer-printed", "momentum", "transfer
 
 #: Within this of a true peak counts as at the corner. [s]
 _CORNER_S = 2.0
+#: A number with its sign and exponent, not one within a name.
+_NUMBER = re.compile(r"(?<![\w-])[+−-]?\d[\d.,]*(?:e[+-]?\d+)?(?![\w-])")
 _SIGMAS = {0.68: 1.0, 0.95: 1.96}
 
 
@@ -59,6 +63,7 @@ class BudgetRow:
     peak_coverage_95: Figure | None
     peak_error_percent: tuple[Figure, ...]
     failed: int
+    doubts: tuple[str, ...] = ()  # each with the number of flights that had it
 
     def record(self) -> dict:
         row: dict = {"method": self.method, "failed": self.failed}
@@ -104,6 +109,7 @@ def error_budget(
     plan = load_scenario(scenario) if isinstance(scenario, str) else scenario
     found: list[list[dict]] = [[] for _ in ways]
     failed = [0] * len(ways)
+    doubted: list[Counter[str]] = [Counter() for _ in ways]
     for k in range(runs):
         flight = fly(plan, craft=craft, seed=seed + k, noise=noise)
         axis = _axis(flight)
@@ -111,10 +117,24 @@ def error_budget(
             try:
                 result = disturbance_torque(flight.telemetry, craft, method=method, variant=variant, axis=axis)
                 found[i].append(_judge(result, flight, axis))
+                doubted[i].update(result.doubts)
             except BadInput:
                 failed[i] += 1
             tick()
-    return [_row(name, samples, f) for name, samples, f in zip(methods, found, failed, strict=True)]
+    return [
+        replace(_row(name, samples, f), doubts=_said(said, runs))
+        for name, samples, f, said in zip(methods, found, failed, doubted, strict=True)
+    ]
+
+
+def _said(doubted: Counter[str], runs: int) -> tuple[str, ...]:
+    """Doubts of a method's results, the most frequent first; where only numbers differ between flights they are left out."""
+    alike: dict[str, list[str]] = {}
+    for doubt in doubted:
+        alike.setdefault(_NUMBER.sub("…", doubt), []).append(doubt)
+    counted = {(same[0] if len(same) == 1 else form): sum(doubted[d] for d in same) for form, same in alike.items()}
+    order = sorted(counted, key=lambda d: -counted[d])
+    return tuple(f"{d} ({min(counted[d], runs)} of {runs} flights)" for d in order)
 
 
 def _axis(flight) -> str:
@@ -177,7 +197,9 @@ def _row(name: str, samples: list[dict], failed: int) -> BudgetRow:
 def of_rise(scenario: str | Scenario, rise_s: float) -> Scenario:
     """The scenario with its triangles' rise changed, the record long enough for all of them.
 
-    Raises BadInput for a scenario without triangles."""
+    Raises BadInput for a scenario without triangles, and for a rise that is none."""
+    if not 0 < rise_s < 1e4:
+        raise BadInput(f"a rise of {rise_s:g} s is not possible", remedy='Give positive seconds, as in "5,15,30".')
     plan = load_scenario(scenario) if isinstance(scenario, str) else scenario
     torques = [dict(t) for t in plan.as_written.get("torques", [])]
     pulses = [t for t in torques if t.get("shape") == "triangles"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 from .options import CM, CRAFT, INERTIA, JSON, craft_from, hashes, numbers_of
-from .output import print_json, provenance
+from .output import print_doubts, print_json, provenance
 
 
 def budget(
@@ -48,11 +48,12 @@ def budget(
         for rise, one in plans:
             rows = error_budget(one, ship, names, runs=runs, seed=seed, noise=noise, tick=lambda: bar.advance(task))
             tables.append((rise, rows))
+    doubts = list(dict.fromkeys(f"{r.method}: {d}" for _, rows in tables for r in rows for d in r.doubts))
     if json:
         records = [r.record() | ({} if rise is None else {"rise_s": rise}) for rise, rows in tables for r in rows]
         options = {"scenario": scenario, "runs": runs, "methods": names, "widths_s": widths, "noise": noise, "craft": craft,
                    "inertia": inertia, "cm": cm}  # fmt: skip
-        print_json({"command": "budget", "scenario": plan.name, "runs": runs, "rows": records, "doubts": [],
+        print_json({"command": "budget", "scenario": plan.name, "runs": runs, "rows": records, "doubts": doubts,
                     "provenance": provenance(hashes(scenario, craft), options, seed)})  # fmt: skip
         return
     for rise, rows in tables:
@@ -61,6 +62,7 @@ def budget(
             + (f", rise {rise:g} s" if rise is not None else "")
         )
         _print(rows)
+    print_doubts(doubts)
 
 
 def _print(rows) -> None:

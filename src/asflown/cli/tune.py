@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 from .options import CM, CRAFT, INERTIA, JSON, craft_from, hashes, numbers_of
-from .output import print_json, provenance
+from .output import print_doubts, print_json, provenance
 
 
 def tune(
@@ -19,12 +19,13 @@ def tune(
     json: bool = JSON,
 ) -> None:
     """Search the printed method's smoothing span as the paper did, and show what the best one balances."""
-    from asflown.campaigns.tune import SPANS, tune
+    from asflown.campaigns.tune import SPANS, remarks, tune
 
     ship = craft_from(craft, inertia, cm)
     rises = numbers_of(widths, "--widths")
     shares = numbers_of(spans, "--spans") if spans else list(SPANS)
     rows = tune(ship, rises=rises, spans=shares, runs=runs, noise=noise)
+    said = remarks(rows)
     best = min(rows, key=lambda r: r.worst_percent)
     if json:
         options = {
@@ -37,7 +38,7 @@ def tune(
             "cm": cm,
         }
         print_json({"command": "tune", "rises_s": rises, "rows": [r.record() for r in rows], "best_span": best.span,
-                    "doubts": [_DOUBT], "provenance": provenance(hashes(craft), options, 0)})  # fmt: skip
+                    "doubts": said, "provenance": provenance(hashes(craft), options, 0)})  # fmt: skip
         return
     print("mean error at the peaks [%]: as printed (smoothing alone, with I w put back), per rise of the triangles")
     print("   span  samples   " + "".join(f"{f'{r:g} s':>22s}" for r in rises) + "     rms [mN m]")
@@ -45,12 +46,6 @@ def tune(
         cells = "".join(
             f"{a:+12.1f} ({b:+6.1f})" for a, b in zip(r.peak_error_percent, r.smoothing_percent, strict=True)
         )
-        print(f"  {r.span:5.0%} {r.samples:8d}   {cells}     {', '.join(f'{1e3 * v:.2f}' for v in r.rms_Nm)}"
+        print(f"  {r.span:5.0%} {'/'.join(str(n) for n in dict.fromkeys(r.samples)):>8s}   {cells}     {', '.join(f'{1e3 * v:.2f}' for v in r.rms_Nm)}"
               + ("   <- least" if r is best else ""))  # fmt: skip
-    print(f"  DOUBT  {_DOUBT}")
-
-
-_DOUBT = (
-    "the best span is the one at which smoothing takes off what leaving I w out puts on: it holds for these widths and "
-    "this record length only"
-)
+    print_doubts(said)

@@ -97,8 +97,11 @@ def jets(
         )
     # a profile's limit where sigma is unknown too: Fisher's in place of chi squared
     limit = surface.least * (1 + fisher.ppf(0.95, 1, worth - free) / (worth - free))
+    misfit = _misfit_doubts(data, left, free)
     found = tuple(
-        Source(j, (None, None), (None, None)) if fit == "printed" else _source(surface, i, j, limit)
+        Source(j, (None, None), (None, None))
+        if fit == "printed"
+        else replace(_source(surface, i, j, limit), explained=not misfit)
         for i, j in enumerate(sources)
     )
     inside = (met.time_s >= data.nodes_s[0]) & (met.time_s <= data.last_s) & np.isfinite(met.density_kgm3)
@@ -106,7 +109,7 @@ def jets(
     scores = () if fit == "printed" else _scores(sources, columns, data.y, worth)
     doubts += [
         *(() if fit == "printed" else _doubts(found, scores, widths, alike)),
-        *_misfit_doubts(data, left, free),
+        *misfit,
         *met.doubts,
     ]
     return JetsResult(
@@ -219,6 +222,8 @@ def _doubts(found, scores, widths: str, alike: float) -> list[str]:
     doubts = []
     width = "; its width means nothing" if widths == "own" else ""
     for s in found:
+        if not s.explained:
+            continue
         if not s.density_known:
             doubts.append(
                 f"{s.jet.name} is not identified: its density may be zero, and an upper limit is all there is{width}"
@@ -247,5 +252,6 @@ def _misfit_doubts(data: JetData, left: np.ndarray, free: int) -> list[str]:
     if square < freedom + 5 * np.sqrt(2 * freedom):
         return []
     return [
-        f"these jets do not explain the telemetry: chi-square {square:.0f} for {freedom}; their form, the loop's gains, or another torque?"
+        f"these jets do not explain the telemetry (chi-square {square:.0f} for {freedom}), so none is identified and intervals mean nothing: "
+        "their form, the loop's gains, or another torque?"
     ]

@@ -87,9 +87,11 @@ def through_loop(met: DensityResult, sources: list[Jet], closest_s: float) -> Je
         if met.gravity_gradient_Nm is not None:
             gravity = met.gravity_gradient_Nm.reshape(len(met.time_s), -1)[:, i]
             axis = axis.without(np.interp(axis.time_s - closest_s, met.time_s, gravity))
-        own, W = regression(axis, nodes + closest_s, 1e-6 * axis.levels.torque_Nm).until(closest_s + nodes[-1])
-        y.append(own)
-        A.append(W * met.per_density(a, nodes))
+        # what came later belongs to a torque that no node stands for, and quantities taken as known would be bent to fit it
+        axis = axis.until(closest_s + nodes[-1])
+        r = regression(axis, nodes + closest_s, 1e-6 * axis.levels.torque_Nm)
+        y.append(r.y)
+        A.append(r.W * met.per_density(a, nodes))
     return JetData(np.concatenate(y), np.concatenate(A), nodes, "sigma")
 
 

@@ -19,16 +19,19 @@ _OF = {
 
 @dataclass(frozen=True)
 class Source:
-    """A fitted jet and the 95 % intervals of its density [kg/m3] and width [rad]; None at an open end, both None where there is none."""
+    """A fitted jet and the 95 % intervals of its density [kg/m3] and width [rad]; None at an open end, both None where there is none.
+
+    ``explained``: whether the jets together explain the telemetry; where they do not, intervals mean nothing and none is identified."""
 
     jet: Jet
     density_95: tuple[float | None, float | None]
     width_95: tuple[float | None, float | None]
+    explained: bool = True
 
     @property
     def density_known(self) -> bool:
         low, high = self.density_95
-        return low is not None and low > 0 and high is not None
+        return self.explained and low is not None and low > 0 and high is not None
 
     @property
     def width_known(self) -> bool:

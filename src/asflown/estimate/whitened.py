@@ -52,6 +52,12 @@ class AxisData:
         """The same less what a known torque (N,), at the instants of the pass, does."""
         return replace(self, data=without_known(self.body, self.levels, self.times, self.data, lambda _: torque_Nm))
 
+    def until(self, stop_s: float) -> AxisData:
+        """The same less what was measured later [s from the epoch]."""
+        n = int(np.sum(self.measured_s <= stop_s))  # they are in order of time
+        start, row, value = self.data.start, self.data.row, self.data.value
+        return replace(self, data=Measurements(np.minimum(start, n), row[:n], value[:n]), columns=self.columns[:n])
+
     def answers(self, nodes_s: np.ndarray) -> np.ndarray:
         """Measurements (M, C) that torques of 1 N m at each node give, straight lines to zero at the nodes beside it."""
         return response(self.body, self.levels, self.times, self.data, hats(self.time_s, nodes_s))
@@ -66,21 +72,14 @@ def hats(time_s: np.ndarray, nodes_s: np.ndarray) -> np.ndarray:
 class Regression:
     """y = W T + noise of unit size; rows of what is taken as known have been projected out.
 
-    y (R,), W (R, C); ``log_evidence``: of the data with no torque at the nodes; ``at_s`` (R,): when each row was measured from
-    the epoch, minus infinity for the rows that hold priors."""
+    y (R,), W (R, C); ``log_evidence``: of the data with no torque at the nodes."""
 
     y: np.ndarray
     W: np.ndarray
     log_evidence: float
-    at_s: np.ndarray
     axis: AxisData
     answers: np.ndarray
     gains: Gains
-
-    def until(self, stop_s: float) -> tuple[np.ndarray, np.ndarray]:
-        """y and W of what was measured by then: innovations never look ahead."""
-        keep = self.at_s <= stop_s
-        return self.y[keep], self.W[keep]
 
     def remainders(self, torque_Nm: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """One remaining torque (K, N) for each torque (K, C) at the nodes, drawn given the data."""
@@ -105,5 +104,4 @@ def regression(axis: AxisData, nodes_s: np.ndarray, size_Nm, answers: np.ndarray
     Q, R = np.linalg.qr(D)
     y, W = y - Q @ (Q.T @ y), W - Q @ (Q.T @ W)
     evidence = g.log_likelihood + 0.5 * float(g.own @ g.own - y @ y) - float(np.sum(np.log(np.abs(np.diag(R)))))
-    at = np.append(axis.measured_s, np.full(P, -np.inf))
-    return Regression(y, W, evidence, at, axis, answers, g)
+    return Regression(y, W, evidence, axis, answers, g)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import textwrap
-
 import numpy as np
 
 from ..dynamics.plume import jet_density
 from ..estimate.density_result import DensityResult
 from ..estimate.jets_result import JetsResult
-from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, new_figure, save
+from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, new_figure, save, write_doubts
 
 _PLUME_S = (-60.0, 180.0)  # where jets are met
 _HEIGHTS = 6  # scale heights of an atmosphere that are shown
@@ -137,6 +135,4 @@ def finish(figure, ax, result: DensityResult, title: str, doubts) -> None:
     ax.legend(frameon=False, fontsize=8)
     ax.set_title(title, loc="left", fontsize=11)
     ax.set_xlabel(f"time from closest approach, {result.closest_approach} [s]")
-    if doubts:
-        text = "\n".join(textwrap.fill("DOUBT " + d, 125) for d in doubts[:4])
-        figure.supxlabel(text, fontsize=6.5, color=RED, x=0.02, ha="left")
+    write_doubts(figure, doubts)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import textwrap
-
 import numpy as np
 
 from ..estimate.external_result import AXES, ExternalTorque
-from .figure import BLUE, GREY, RED, breaks, new_figure, save
+from .figure import BLUE, GREY, RED, breaks, new_figure, save, write_doubts
 from .torque import time_scale
 
 _BLOCKS = 30
@@ -54,7 +52,5 @@ def save_external_torque_figure(result: ExternalTorque, path) -> None:
     )
     panels[0].legend(frameon=False, fontsize=7, loc="best", ncols=4)
     panels[-1].set_xlabel(f"time from {result.epoch} [{time_scale(result.time_s)[1]}]")
-    if result.doubts:
-        text = "\n".join(textwrap.fill("DOUBT " + d, 125) for d in result.doubts[:4])
-        figure.supxlabel(text, fontsize=6.5, color=RED, x=0.02, ha="left")
+    write_doubts(figure, result.doubts)
     save(figure, path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,9 @@ from ..kit.files import write_whole
 
 #: Colours that also differ in grey and for the colour-blind (Okabe and Ito).
 BLUE, ORANGE, GREEN, RED, PURPLE, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#777777"
+SKY = "#56B4E9"
 BY_AXIS = (BLUE, ORANGE, GREEN)
+_ROOM = 4  # doubts beneath a figure
 
 
 def new_figure(rows: int = 1, columns: int = 1, *, width: float = 8.0, height: float = 3.0, sharex: bool = True):
@@ -28,6 +31,16 @@ def new_figure(rows: int = 1, columns: int = 1, *, width: float = 8.0, height: f
         for side in ("top", "right"):
             ax.spines[side].set_visible(False)
     return figure, axes
+
+
+def write_doubts(figure, doubts, *, first=(), columns: int = 125) -> None:
+    """Doubts beneath a figure, those in ``first`` before all others, and how many there was no room for."""
+    ordered = [d for d in first if d in doubts] + [d for d in doubts if d not in first]
+    lines = [textwrap.fill("DOUBT " + d, columns) for d in ordered[:_ROOM]]
+    if len(ordered) > _ROOM:
+        lines.append(f"and {len(ordered) - _ROOM} more doubt{'s' if len(ordered) > _ROOM + 1 else ''}, in the text")
+    if lines:
+        figure.supxlabel("\n".join(lines), fontsize=6.5, color=RED, x=0.02, ha="left")
 
 
 def picture_kind(path: str | Path) -> str:

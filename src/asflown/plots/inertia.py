@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import textwrap
-
 import numpy as np
 
 from ..estimate.inertia_result import InertiaResult
 from ..telemetry.channels import AXES
-from .figure import BY_AXIS, GREY, RED, breaks, new_figure, save
+from .figure import BY_AXIS, GREY, breaks, new_figure, save, write_doubts
 
 
 def draw_rates(result: InertiaResult, ax):
@@ -58,7 +56,5 @@ def save_inertia_figure(result: InertiaResult, path) -> None:
     draw_residual(result, left)
     rates.set_title(f"Slews of {result.craft}, {result.method} fit", loc="left", fontsize=11, pad=14)
     left.set_xlabel(f"time from {result.epoch} [s]")
-    if result.doubts:
-        text = "\n".join(textwrap.fill("DOUBT " + d, 150) for d in result.doubts[:4])
-        figure.supxlabel(text, fontsize=6.5, color=RED, x=0.02, ha="left")
+    write_doubts(figure, result.doubts, columns=150)
     save(figure, path)

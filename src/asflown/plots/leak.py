@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import textwrap
-
 import numpy as np
 
 from ..estimate.leak_result import LeakResult
-from .figure import BLUE, BY_AXIS, GREY, RED, new_figure, save
+from .figure import BLUE, BY_AXIS, GREY, RED, new_figure, save, write_doubts
 from .torque import time_scale
 
 _AXES = "XYZ"
@@ -71,7 +69,5 @@ def save_leak_figure(result: LeakResult, path) -> None:
         if result.together:
             what = f"momentum as of {', '.join(result.together)} together"
     momentum.set_title(f"Leak monitor of {result.craft}, {result.method}: {what}", loc="left", fontsize=10)
-    if result.doubts:
-        text = "\n".join(textwrap.fill("DOUBT " + d, 125) for d in result.doubts[:4])
-        figure.supxlabel(text, fontsize=6.5, color=RED, x=0.02, ha="left")
+    write_doubts(figure, result.doubts)
     save(figure, path)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import textwrap
-
 import numpy as np
 
 from ..estimate.thrust_result import EventSeen, ThrustResult
-from .figure import BLUE, BY_AXIS, GREEN, GREY, ORANGE, PURPLE, RED, new_figure, save
+from .figure import BLUE, BY_AXIS, GREEN, GREY, ORANGE, PURPLE, RED, new_figure, save, write_doubts
 from .torque import time_scale
 
 _RPM = 60 / (2 * np.pi)
@@ -95,7 +93,5 @@ def save_thrust_figure(result: ThrustResult, path) -> None:
             ax.set_xlabel(f"time from the record's epoch [{unit}]")
     draw_thrusts(result, panels[-1])
     panels[-1].set_title(f"Thrust of {result.craft}: {result.method}, {result.variant}", loc="left", fontsize=9)
-    if result.doubts:
-        text = "\n".join(textwrap.fill("DOUBT " + d, 125) for d in result.doubts[:4])
-        figure.supxlabel(text, fontsize=6.5, color=RED, x=0.02, ha="left")
+    write_doubts(figure, result.doubts)
     save(figure, path)

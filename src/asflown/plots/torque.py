@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import textwrap
-
 import numpy as np
 
 from ..estimate.result import AXES, TorqueResult
-from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, new_figure, save
+from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, new_figure, save, write_doubts
 
-_COLORS = (BLUE, RED, GREEN, ORANGE, PURPLE)
+_COLORS = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, "black")
 
 
 def torque_scale(result: TorqueResult) -> tuple[float, str]:
@@ -57,20 +55,34 @@ def draw_truth(time_s, torque_Nm, ax, *, label="true torque"):
 
 
 def save_torque_figure(results: list[TorqueResult], path) -> None:
-    """One panel an axis, every result in it, doubts of the first beneath."""
+    """One panel an axis, every result in it, the first on top, doubts of the first beneath."""
     axes = results[0].axes
     figure, panels = new_figure(len(axes), height=2.8 if len(axes) > 1 else 4.0)
     for j, ax in zip(axes, panels, strict=True):
-        for result, color in zip(results, _COLORS, strict=False):
-            if np.isfinite(result.torque_Nm[:, j]).any():
-                draw_torque(result, ax, j, color=color)
+        for k in reversed(range(len(results))):
+            if np.isfinite(results[k].torque_Nm[:, j]).any():
+                draw_torque(results[k], ax, j, color=_COLORS[k % len(_COLORS)])
         ax.axhline(0, color=GREY, linewidth=0.6)
+        _fit_height(ax, results, j)
     if len(results) > 1:
-        panels[0].legend(loc="upper right", fontsize=8, frameon=False)
+        lines, labels = panels[0].get_legend_handles_labels()
+        panels[0].legend(lines[::-1], labels[::-1], loc="upper right", fontsize=8, frameon=False)
     panels[0].set_title(f"Disturbance torque on {results[0].craft}: {results[0].method}, {results[0].variant} (bands: 95 %)",
                         loc="left", fontsize=11)  # fmt: skip
     panels[-1].set_xlabel(f"time from {results[0].epoch} [{time_scale(results[0].time_s)[1]}]")
-    if results[0].doubts:
-        text = "\n".join(textwrap.fill("DOUBT " + d, 125) for d in results[0].doubts[:4])
-        figure.supxlabel(text, fontsize=6.5, color=RED, x=0.02, ha="left")
+    write_doubts(figure, results[0].doubts)
     save(figure, path)
+
+
+def _fit_height(ax, results: list[TorqueResult], j: int) -> None:
+    """Ends of a polynomial, which swing far out, do not set the scale; all of the first result is seen."""
+    scale, first = torque_scale(results[0])[0], results[0]
+    sigma = 0.0 if first.sigma_Nm is None else 1.96 * first.sigma_Nm[:, j]
+    seen = [first.torque_Nm[:, j] - sigma, first.torque_Nm[:, j] + sigma]
+    for other in results[1:]:
+        inner = slice(len(other.time_s) // 20, len(other.time_s) - len(other.time_s) // 20)
+        seen.append(other.torque_Nm[inner, j])
+    values = scale * np.concatenate(seen)
+    values = values[np.isfinite(values)]
+    if len(results) > 1 and len(values) and np.ptp(values) > 0:
+        ax.set_ylim(values.min() - 0.05 * np.ptp(values), values.max() + 0.15 * np.ptp(values))

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import textwrap
-
 import numpy as np
 
 from ..estimate.wheel_result import RUN_DOWN, WheelDrag, WheelsResult
-from .figure import BLUE, GREEN, GREY, ORANGE, RED, breaks, new_figure, save
+from .figure import BLUE, GREEN, GREY, ORANGE, RED, breaks, new_figure, save, write_doubts
 from .torque import time_scale
 
 _RPM = 60 / (2 * np.pi)
@@ -97,7 +95,5 @@ def save_wheels_figure(result: WheelsResult, path) -> None:
     panels[0].legend(frameon=False, fontsize=7, loc="best")
     panels[-2].set_xlabel(f"time from {result.epoch} [{unit}]")
     panels[-1].set_xlabel("speed [rpm]")
-    if result.doubts:
-        text = "\n".join(textwrap.fill("DOUBT " + d, 150) for d in result.doubts[:4])
-        figure.supxlabel(text, fontsize=6.5, color=RED, x=0.02, ha="left")
+    write_doubts(figure, result.doubts, columns=150)
     save(figure, path)
