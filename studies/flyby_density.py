@@ -19,7 +19,6 @@ from asflown.estimate.density import density
 from asflown.sim.fly import fly
 
 HELD = {"velocity_B": (0, 1, 0), "up_B": (1, 0, 0)}
-_STEP = 1 / 12**0.5  # s: a peak is found on instants a second apart
 KINDS = {
     "E3, exponent 1": ("e3", 180.0, {}),
     "E4, exponent 1": ("e4", 180.0, {}),
@@ -48,7 +47,7 @@ def row(craft, scenario: str, closest_s: float, gas: dict, seed: int):
         late,
         100 * rms,
         off / r.peak.sigma_shape_kgm3,
-        late / max(r.peak.sigma_time_s, _STEP),
+        late / r.peak.sigma_time_s,
         pull,
     ]
     if r.atmosphere is not None:

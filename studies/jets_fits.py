@@ -2,12 +2,12 @@
 
 Run: python studies/jets_fits.py [FLIGHTS]      (20 take ten minutes)
 
-Simulated flybys E3 with the jets of 004 Table 3, exponent 1, nominal noise, fitted with that exponent until the simulator's jets fade.
+Simulated flybys E3 with the jets of 004 Table 3, exponent 1, nominal noise, fitted with that exponent; records run on after the plume.
 For each fit: how often the 95 % intervals hold the truth, how wide they are as a share of it (median; open ones count as infinite),
 how often Alexandria is told to be there, and the error of the model's peak.  "bandwidth": the controller's taken 5 % too high.
 
-Answer, 2026-11 (200 flights, 20 with the bandwidth off): with a common width intervals of Cairo and Damascus are 7 and 14 % wide through the loop, 19 and 39 % by
-momentum; with own widths 27 and 33, 47 and 74 %.  All hold in 92 to 100 %.  A bandwidth 5 % off moves the peak by +1.7 % and Cairo's density out of its interval in 45 % of the flights.
+Answer, 2026-11 (60 flights): with a common width intervals of Cairo and Damascus are 6 and 11 % wide through the loop, 17 and 33 % by momentum; with own
+widths 25 and 28, 43 and 58 %.  All hold in 88 to 100 %.  A bandwidth 5 % off moves the peak by +1.6 % and Cairo's density out of its interval in 45 % of the flights.
 Hence momentum is the default of ``--fit``, which needs no loop.
 """
 

@@ -5,6 +5,7 @@ import sys
 import numpy as np
 import pytest
 
+from asflown.cli.flyby_options import sources_from
 from asflown.craft.load import load_craft
 from asflown.dynamics.flyby import flyby_called
 from asflown.dynamics.plume import as_passed, plume_density, published_jets, seen_from
@@ -204,3 +205,28 @@ def test_a_speed_too_low_to_pass_is_refused():
 
     with pytest.raises(BadInput, match="stays with it"):
         replace(flyby_called("Titan"), speed_m_s=2000.0).altitude(0.0)
+
+
+def test_one_wrong_row_is_named_and_a_wrong_unit_is_not_the_telemetrys_fault(tmp_path):
+    lines = table().splitlines()
+    at = len(lines) // 2
+    cells = lines[at].split(",")
+    lines[at] = ",".join([cells[0], str(float(cells[1]) + 50), *cells[2:]])
+    (tmp_path / "t.csv").write_text("\n".join(lines))
+    with pytest.raises(BadInput, match="another velocity"):
+        load_trajectory(tmp_path / "t.csv")
+    t, r, v = straight()
+    with pytest.raises(BadInput, match="gas is looked for within"):
+        Trajectory.along(E3, t, 1e3 * r, 1e3 * v)
+    near = np.abs(t) <= 20
+    (doubt,) = Trajectory.along(E3, t[near], r[near], v[near]).doubts
+    assert "from -20 to +20 s only" in doubt
+
+
+def test_a_source_by_tilt_and_offset_has_no_place_along_a_trajectory():
+    path = Trajectory.along(E3, *straight())
+    with pytest.raises(BadInput, match="follows a trajectory"):
+        sources_from(["X=5 deg,3 km"], path)
+    with pytest.raises(BadInput, match="beyond 90 degrees"):
+        sources_from(["X=120 deg,30 deg"], E3)
+    assert len(sources_from(["X=80 deg,30 deg"], path)) == 1

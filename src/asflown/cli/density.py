@@ -78,9 +78,8 @@ def density(
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
     path, of_path = flyby_from(flyby, closest_approach, trajectory, kernels, telemetry, ship)
     drag = drag_from(axis, method, area, arm, velocity, up, drag_table)
-    result = density_of(
-        telemetry, ship, path, closest_approach, variant=variant, sources=sources_from(source, path), **drag
-    )
+    given = sources_from(source, path)
+    result = density_of(telemetry, ship, path, closest_approach, variant=variant, sources=given, **drag)
     if plot is not None:
         from asflown.plots.density import save_density_figure
 
@@ -90,7 +89,7 @@ def density(
         from asflown.plots.figure import save_figures
         from asflown.plots.flyby import flyby_figures
 
-        for path in save_figures(flyby_figures(result, telemetry, ship), plot_dir):
+        for path in save_figures(flyby_figures(result, telemetry, ship, sources=given), plot_dir):
             say(f"wrote {path}")
     if json:
         options = {"craft": craft, "flyby": result.flyby.name, "closest_approach": closest_approach, "axis": result.axis,

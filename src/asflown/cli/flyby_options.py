@@ -12,7 +12,7 @@ AXIS = typer.Option(
 METHOD = typer.Option(
     None,
     "--method",
-    help="Of the torque: fused (default), momentum, transfer, polynomial; on-times where thrusters fire.",
+    help="Of the torque: fused (default), momentum, transfer, polynomial; on-times where thrusters fire; with attitude errors and no body rates, transfer.",
 )
 AREA = typer.Option(None, "--area", help='Projected area, as in "18.4 m2"; the craft\'s unless given.')
 ARM = typer.Option(None, "--arm", help='Moment arm, as in "0.85 m"; the craft\'s unless given.')
@@ -91,7 +91,10 @@ def sources_from(texts: list[str] | None, flyby):
     The second number's unit says which of the two forms it is.  Raises BadInput for one that cannot be read."""
     if not texts:
         return None
+    import numpy as np
+
     from asflown.dynamics.plume import Jet, as_passed
+    from asflown.dynamics.trajectory import Trajectory
     from asflown.kit.errors import BadInput
     from asflown.kit.quantities import quantity
 
@@ -106,6 +109,16 @@ def sources_from(texts: list[str] | None, flyby):
             )
         first, angle = quantity(parts[0], "rad"), parts[1].endswith(("deg", "rad"))
         second = quantity(parts[1], "rad" if angle else "m")
+        if angle and abs(first) > np.pi / 2:
+            raise BadInput(
+                f"--source {text!r} has a latitude beyond 90 degrees",
+                remedy="South latitude comes first, then west longitude.",
+            )
+        if not angle and isinstance(flyby, Trajectory):
+            raise BadInput(
+                f"--source {text!r} has tilt and offset from the plane of a straight flyby, and this one follows a trajectory",
+                remedy='Give its place: "NAME=SOUTH LATITUDE,WEST LONGITUDE".',
+            )
         if angle:
             found.append(as_passed(Jet(name.strip(), 1.0, 0.3, 0.0, 0.0, first, second), flyby))
         else:

@@ -15,9 +15,12 @@ from scipy.optimize import minimize_scalar
 
 from ..kit.errors import BadInput
 from .flyby import Flyby
+from .plume import FARTHEST_M
 
 #: A trajectory is nearest at the closest approach named, but for so much. [s]
 _NEAR_S = 1.0
+#: A trajectory should hold what is below this altitude; gravity hardly bends what is above. [m]
+_HELD_M = 1000e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +50,11 @@ class Trajectory(Flyby):
                 f"the trajectory comes within {least / 1e3:.1f} km of {flyby.moon.name}'s centre, less than its radius of {flyby.moon.radius_m / 1e3:g} km",
                 remedy="Give positions from the body's centre, with their unit.",
             )
+        if least - flyby.moon.radius_m > FARTHEST_M:
+            raise BadInput(
+                f"the trajectory stays {least / 1e3:.0f} km and more from {flyby.moon.name}'s centre: gas is looked for within {FARTHEST_M / 1e3:.0f} km of its surface",
+                remedy="Give positions from the body's centre, and check their unit.",
+            )
         at, speed = path.place(0.0), float(path.speed(0.0))
         common |= {
             "altitude_m": float(np.linalg.norm(at)) - flyby.moon.radius_m,
@@ -66,12 +74,16 @@ class Trajectory(Flyby):
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        late = self.closest_s
-        if abs(late) < _NEAR_S:
-            return ()
-        return (
-            f"the trajectory is nearest {abs(late):.1f} s {'after' if late > 0 else 'before'} the closest approach named",
-        )
+        late, found = self.closest_s, []
+        if abs(late) >= _NEAR_S:
+            when = "after" if late > 0 else "before"
+            found.append(f"the trajectory is nearest {abs(late):.1f} s {when} the closest approach named")
+        ends = self.time_s[[0, -1]]
+        if (self.altitude(ends) < _HELD_M).any():
+            found.append(
+                f"the trajectory runs from {ends[0]:+.0f} to {ends[1]:+.0f} s only: beyond, though still within reach of gas, the path counts as straight"
+            )
+        return tuple(found)
 
     @cached_property
     def _spline(self) -> CubicHermiteSpline:

@@ -25,19 +25,19 @@ from ..craft.model import Craft
 from ..dynamics.environment import gravity_gradient, gravity_gradient_bound
 from ..dynamics.flyby import Flyby, flyby_called, published_peaks
 from ..dynamics.plume import FARTHEST_M, Jet, as_passed, published_jets
-from ..kit.errors import BadInput
+from ..kit.errors import BadInput, some_of
 from ..kit.timeline import utc_label
 from ..telemetry.telemetry import Telemetry
 from .atmosphere import fit_atmosphere
-from .density_axes import agreement_of, drawn_densities, weights
-from .density_peak import DrawnPeaks, draw_peaks
-from .density_result import Beside, DensityPeak, DensityResult, Noticed
+from .density_axes import agreement_of, drawn_densities, tells, weights
+from .density_peak import TIME_STEP_S, DrawnPeaks, draw_peaks
+from .density_result import Beside, DensityPeak, DensityResult, Noticed, total
 from .flyby_drag import PRINTED_SHAPE, DragAlong, flyby_drag
 from .on_times import gained
 from .peaks import spread
 from .result import AXES
-from .subject import slews, subject_of, thrusters_firing
-from .torque import disturbance_torque
+from .subject import check_on_times, slews, subject_of, thrusters_firing
+from .torque import METHODS, disturbance_torque
 from .torque_on_times import torque_on_times
 
 #: The part of a record that a result shows, either side of closest approach. [s]
@@ -45,6 +45,18 @@ REACH_S = 600.0
 _NOTICED = 3.0  # sigma
 _NOTICED_SHARE = 0.995  # of drawn densities above zero
 _FEWEST = 10  # instants
+#: A density as far below zero as this is no noise. [sigma]
+_NEGATIVE = 8.0
+#: Chi-square of a step beyond which an atmosphere does not explain the record.
+_MISFIT = 3.0
+#: Share by which wheels alone, without the body's own momentum, came out too high on a simulated E3.
+_WITHOUT_BODY = 0.2
+#: Share by which the height of a cusp came out low on simulated flights E5 held by thrusters.
+_CUSP_ON_TIMES = 0.11
+#: Where gas is to be met, near closest approach. [s]
+_PLUME_S = (-20.0, 60.0)
+#: Of drawn peaks at an end of the record, beyond which the largest density may lie outside it.
+_AT_AN_END = 0.05
 
 
 def density(
@@ -82,6 +94,8 @@ def density(
             "the gravity gradient needs the direction of flight and the vertical, and only one is given",
             remedy="Give both (--velocity and --up), or none: then it is bounded.",
         )
+    if method is not None and method not in (*METHODS, "on-times"):
+        raise BadInput(f"method {method!r} is not known", remedy=f"Choose one of: {some_of((*METHODS, 'on-times'))}.")
     printed, steps = variant == "printed", None
     drag = flyby_drag(craft, where, axis, area_m2, arm_m, drag_table, printed)
     closest_ns = telemetry.moment(closest_approach)
@@ -93,7 +107,18 @@ def density(
             file=telemetry.source or None,
             remedy=f"The telemetry runs from {first:g} to {last:g} s of its epoch, {telemetry.epoch_label}.",
         )
+    check_on_times(telemetry, craft)
     about = drag.names if len(drag.axes) == 1 else "all"
+    bodiless = [a for a in drag.names if f"body_rate_{a}" not in telemetry]
+    if (
+        bodiless
+        and method is None
+        and not printed
+        and f"attitude_error_{bodiless[0]}" in telemetry
+        and craft.wheel_controller is not None
+        and not thrusters_firing(telemetry)
+    ):
+        method = "transfer"  # answers to the body's motion too, as wheels alone do not
     if not printed and (method == "on-times" or (method is None and thrusters_firing(telemetry))):
         if about == "all":
             raise BadInput(
@@ -136,16 +161,23 @@ def density(
     if not drag.signed:
         sign = float(np.sign(of_gas[known, 0][np.argmax(np.abs(of_gas[known, 0]))])) or 1.0
     K = sign * drag.at(time_s)[:, axes]
+    known &= tells(K)
     with np.errstate(divide="ignore", invalid="ignore"):
         each = of_gas / K
         of_each = None if torque.sigma_Nm is None else torque.sigma_Nm[:, axes] / np.abs(K)
-    left_out = bound / np.linalg.norm(K, axis=1)
+        left_out = bound / np.linalg.norm(K, axis=1)
     weight = weights(K, of_each)
-    rho = np.sum(np.where(weight > 0, weight * each, 0.0), axis=1)
+    rho = np.where(weight.any(axis=1), np.sum(weight * np.where(weight > 0, each, 0.0), axis=1), np.nan)
+    sigma: np.ndarray | None = None
     if printed:
         sigma = PRINTED_SHAPE * np.abs(rho)
-    else:
-        sigma = None if of_each is None else np.sqrt(np.sum(np.where(weight > 0, weight * of_each, 0.0) ** 2, axis=1))
+    elif of_each is not None:
+        sigma = np.sqrt(np.sum((weight * np.where(weight > 0, of_each, 0.0)) ** 2, axis=1))
+    if bodiless and torque.method == "momentum" and sigma is not None:
+        sigma = np.hypot(sigma, _WITHOUT_BODY * np.abs(rho))
+        doubts.append(
+            f"without body rates the body's own momentum is left out, which made a simulated E3 {100 * _WITHOUT_BODY:.0f} % too dense: that is in sigma (add body_rate_{bodiless[0]})"
+        )
     agreement = agreement_of(each[near], None if of_each is None else of_each[near], rho[near], known[near])
     if agreement is not None and agreement.p < 1e-3:
         doubts.append(
@@ -159,12 +191,23 @@ def density(
         steps = steps or gained(telemetry, craft, about)
         taken_off = None if gravity is None else (time_s, gravity[:, 0])
         atmosphere = fit_atmosphere(steps, where, middle, partial(_about, drag, sign, axes[0]), taken_off)
+        if atmosphere.misfit > _MISFIT:
+            doubts.append(
+                f"no exponential atmosphere explains the momentum gained (chi-square {atmosphere.misfit:.1f} for each step): is this record of {where.name}?"
+            )
     found = None
     cusps = cusps and atmosphere is None
     if cusps and not printed and where.latitude_south_rad is not None and len(torque.evidence) >= len(axes):
         found = _cusps(torque, drag, sign, where, middle, gravity, time_s, sources)
     peak = _peak(time_s, rho, sigma, drag.scale, where, known, drawn_s, drawn, found)
-    doubts += _peak_doubts(peak, time_s, bound, known, gravity is not None, printed)
+    if torque.method == "on-times" and atmosphere is None:
+        peak = peak.wider(_CUSP_ON_TIMES * abs(peak.density_kgm3), drag.scale)
+        doubts.append(
+            f"from on-times a cusp's height comes out {100 * _CUSP_ON_TIMES:.0f} % low on simulated flights (a round top's does not): that is in the peak's sigma, not in the band"
+        )
+    unexplained = any("the model does not explain" in d for d in torque.doubts)
+    doubts += _gas_doubts(time_s, rho, sigma, known, drag.signed, unexplained)
+    doubts += _peak_doubts(peak, found, time_s, bound, known, gravity is not None, printed)
     doubts += _cusp_doubts(peak, found) if cusps else []
     at_peak = sign * drag.at(peak.time_s)[axes]
     one = len(axes) == 1
@@ -226,13 +269,15 @@ def _peak(time_s, rho, sigma, scale, flyby, known, drawn_s, drawn, cusps: DrawnP
             "of jets and a remainder",
         )
         shape, when = float(spread(cusps.density_kgm3)), float(spread(cusps.time_s))
+        when = float(np.hypot(when, TIME_STEP_S / np.sqrt(12)))  # all draws on one step do not make it exact
     elif drawn is not None and sigma is not None:
-        inside = (np.abs(drawn_s) <= REACH_S) & (flyby.altitude(drawn_s) <= FARTHEST_M)
-        tops = drawn_s[inside][np.argmax(np.nan_to_num(drawn[:, inside], nan=-np.inf), axis=1)]
-        when = float(np.hypot(spread(tops), _blunt(time_s, rho, known, k, shape)))
+        inside = (drawn_s >= time_s[known][0]) & (drawn_s <= time_s[known][-1]) & np.isfinite(drawn).all(axis=0)
+        tops = drawn_s[inside][np.argmax(drawn[:, inside], axis=1)]
+        step = float(np.median(np.diff(time_s))) / np.sqrt(12)
+        when = float(np.linalg.norm([spread(tops), _blunt(time_s, rho, known, k, shape), step]))
     return DensityPeak(
-        height, at, float(flyby.altitude(at)), shape, None if shape is None else float(np.hypot(shape, scale * height)),
-        when, None if when is None else abs(float(flyby.climb_rate(at))) * when, way,
+        height, at, float(flyby.altitude(at)), shape, total(shape, scale, height),
+        when, None if when is None else float(np.ptp(flyby.altitude(at + when * np.array([-1.0, 0.0, 1.0])))) / 2, way,
     )  # fmt: skip
 
 
@@ -285,13 +330,46 @@ def _date_doubts(telemetry: Telemetry, flyby: Flyby) -> list[str]:
     return [f"{flyby.name} was on {flyby.date}, and this record is of {utc_label(telemetry.epoch_ns)[:10]}"]
 
 
-def _peak_doubts(peak: DensityPeak, time_s, bound, known, gravity: bool, printed: bool) -> list[str]:
-    doubts = []
-    if peak.sigma_shape_kgm3 is not None and peak.density_kgm3 < 4 * peak.sigma_shape_kgm3:
-        doubts.append("the largest density is below four sigma of its noise: no gas is seen, the peak is the noise's")
+def _gas_doubts(time_s, rho, sigma, known, signed: bool, unexplained: bool) -> list[str]:
+    """Whether gas is seen at all, by the curve itself."""
+    if sigma is None:
+        return []
+    size = rho[known] / sigma[known]
+    low = int(np.argmin(size))
+    if signed and size[low] < -_NEGATIVE and -rho[known][low] > rho[known].max():
+        return [
+            f"the density is negative, {rho[known][low]:.2g} kg/m3 at {time_s[known][low]:+.0f} s and {-size[low]:.0f} sigma below zero: has the arm the sign it should have in body axes?"
+        ]
+    if rho[known].max() >= 4 * sigma[known][np.argmax(rho[known])]:
+        return []
+    if unexplained:
+        return [
+            "the largest density is below four sigma, but the model does not explain the telemetry: this says nothing of whether there was gas"
+        ]
     t = time_s[known]
-    if min(peak.time_s - t[0], t[-1] - peak.time_s) < 1e-9:
-        doubts.append("the peak is at an end of the span in which a plume is looked for: is it one?")
+    if not t[0] <= _PLUME_S[0] < _PLUME_S[1] <= t[-1]:
+        return [
+            f"the largest density is below four sigma of its noise: no gas is seen from {t[0]:+.0f} to {t[-1]:+.0f} s, which is all that the record tells"
+        ]
+    return ["the largest density is below four sigma of its noise: no gas is seen, the peak is the noise's"]
+
+
+def _peak_doubts(
+    peak: DensityPeak, found: DrawnPeaks | None, time_s, bound, known, gravity: bool, printed: bool
+) -> list[str]:
+    doubts = []
+    t = time_s[known]
+    at_end = min(peak.time_s - t[0], t[-1] - peak.time_s) < 1e-9
+    if found is not None:
+        at_end = bool(np.mean((found.time_s <= t[0] + 1) | (found.time_s >= t[-1] - 1)) > _AT_AN_END)
+    if at_end:
+        doubts.append(
+            f"the peak is at an end of what the record tells of a plume ({t[0]:+.0f} to {t[-1]:+.0f} s): the largest density may lie outside it"
+        )
+    if not t[0] <= 0 <= t[-1]:
+        doubts.append(
+            f"closest approach is not in the record, which tells of a plume from {t[0]:+.0f} to {t[-1]:+.0f} s"
+        )
     if not gravity and not printed:
         at = int(np.argmin(np.abs(time_s)))
         doubts.append(

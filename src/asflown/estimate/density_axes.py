@@ -8,8 +8,16 @@ from ..kit.regression import memory
 from .density_result import Agreement
 from .result import TorqueResult
 
+#: Gas tells by its torque where it turns the craft by at least this share of the most it does along the flyby.
+_LEAST_ARM = 0.1
 #: Where no axis sees more than this, no gas is taken to be. [sigma]
 _SEEN = 3.0
+
+
+def tells(K: np.ndarray) -> np.ndarray:
+    """Where torques per density (..., n) are large enough to tell the density: not where an arm passes through zero."""
+    size = np.linalg.norm(K, axis=-1)
+    return size >= _LEAST_ARM * size.max()
 
 
 def weights(K: np.ndarray, sigma) -> np.ndarray:

@@ -23,6 +23,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from ..dynamics.flyby import Flyby
 from ..dynamics.plume import FARTHEST_M, Jet, jet_density
+from .density_axes import tells
 from .whitened import AxisData, Regression, regression
 
 POWERS = (1.0, 1.4, 2.0)
@@ -32,8 +33,10 @@ WIDTHS_RAD = np.geomspace(0.1, 1.2, 96)
 LEANS_RAD = np.radians(np.arange(-10, 10.1, 1))
 #: Remainders as shares of the density thereabouts, and up to which altitudes the jets hold. [m]
 SHARES, HOLDS_M = (0.03, 0.1, 0.3), (700e3, 1000e3, FARTHEST_M)
-#: Of jets in one choice; of the span around closest approach; of nodes; of the drawn curves; of "thereabouts". [s]
-_MOST, _SPAN_S, _NODE_S, _FINE_S, _NEARBY_S = 3, (-60.0, 160.0), 0.5, 0.1, 10.0
+#: Of jets in one choice; of the span around closest approach; of nodes; of "thereabouts". [s]
+_MOST, _SPAN_S, _NODE_S, _NEARBY_S = 3, (-60.0, 160.0), 0.5, 10.0
+#: Between the times at which a drawn curve may have its peak.
+TIME_STEP_S = 0.1
 _DRAWS = 400
 #: Remainders' share and reach; the last is no jets and the smooth torque of the fitted levels' length.
 _WAYS = [(share, holds) for holds in HOLDS_M for share in SHARES] + [(1.0, 0.0)]
@@ -151,11 +154,13 @@ class _Plume:
         self.nodes = _nodes()
         self.shapes = _shapes(flyby, sources)
         self.factors = [k(self.nodes) for k in per_density]
+        self.span_s = (max(a.time_s[0] for a in axes) - closest_s, min(a.time_s[-1] for a in axes) - closest_s)
         self.answers = [a.answers(self.nodes + closest_s) for a in axes]
         self.local = [_local(a.smooth_torque(), a.time_s) for a in axes]
         self.largest = max(
-            float(np.max(np.interp(self.nodes + closest_s, a.time_s, size)[k != 0] / np.abs(k[k != 0])))
+            float(np.max(np.interp(self.nodes + closest_s, a.time_s, size)[told] / np.abs(k[told])))
             for a, size, k in zip(axes, self.local, self.factors, strict=True)
+            for told in [tells(k[:, None])]
         )
         most = range(1, min(len(sources), _MOST) + 1)
         self.subsets = [list(c) for n in most for c in combinations(range(len(sources)), n)]
@@ -191,7 +196,7 @@ class _Plume:
     def tops(self, way: tuple[float, float], chosen: np.ndarray, rng) -> np.ndarray:
         """Time and density of the peak of one curve drawn for each choice (K, 3). (K, 2)"""
         fits, y, W = self.regressions(way)
-        fine = np.arange(self.nodes[0], self.nodes[-1], _FINE_S)  # a cusp lies between nodes
+        fine = np.arange(self.nodes[0], self.nodes[-1], TIME_STEP_S)  # a cusp lies between nodes
         jets, curves = np.zeros((len(chosen), len(self.nodes))), np.zeros((len(chosen), len(fine)))
         for row, (form, width, subset) in enumerate(chosen):
             if subset == len(self.subsets):
@@ -211,5 +216,7 @@ class _Plume:
             rests.append([np.interp(fine, t, r) for r in rest])
             weights.append(float(np.sum((f.W * k) ** 2)))  # a remainder tells of the density what its axis does
         curves += np.average(rests, axis=0, weights=weights)
-        top = np.argmax(np.where(self.flyby.altitude(fine) <= FARTHEST_M, curves, -np.inf), axis=1)
+        told = tells(np.stack([k(fine) for k in self.per_density], axis=-1))
+        told &= (self.flyby.altitude(fine) <= FARTHEST_M) & (fine >= self.span_s[0]) & (fine <= self.span_s[1])
+        top = np.argmax(np.where(told, curves, -np.inf), axis=1)
         return np.column_stack([fine[top], curves[np.arange(len(curves)), top]])

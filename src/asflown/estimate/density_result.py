@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -27,6 +27,13 @@ class DensityPeak:
     sigma_time_s: float | None
     sigma_altitude_m: float | None
     way: str = "of the curve"
+
+    def wider(self, shape_kgm3: float, scale: float | None) -> DensityPeak:
+        """With a further error of its height."""
+        if self.sigma_shape_kgm3 is None:
+            return self
+        shape = float(np.hypot(self.sigma_shape_kgm3, shape_kgm3))
+        return replace(self, sigma_shape_kgm3=shape, sigma_kgm3=total(shape, scale, self.density_kgm3))
 
     def record(self) -> dict:
         return dict(vars(self))
@@ -82,7 +89,8 @@ class Agreement:
 class DensityResult:
     """Density over time from closest approach, (N,), NaN where nothing is known; negative values are noise, kept.
 
-    ``sigma_shape``: random, differs from instant to instant; ``scale``: share by which all of it is off together, one sigma;
+    ``sigma_shape``: random, differs from instant to instant; ``scale``: share by which all of it is off together, one sigma, None
+    where that is not known;
     ``bound``: the most that torques left out (gravity gradient, sunlight, ...) may feign.  ``axis``: one, or all that were
     taken together; torques are (N,) then, or (N, n)."""
 
@@ -96,7 +104,7 @@ class DensityResult:
     time_s: np.ndarray
     density_kgm3: np.ndarray
     sigma_shape_kgm3: np.ndarray | None
-    scale: float
+    scale: float | None
     bound_kgm3: np.ndarray
     torque_Nm: np.ndarray
     gravity_gradient_Nm: np.ndarray | None  # taken off the torque; None: not modelled
@@ -119,9 +127,7 @@ class DensityResult:
     @property
     def sigma_kgm3(self) -> np.ndarray | None:
         """Shape and scale together, (N,)."""
-        if self.sigma_shape_kgm3 is None:
-            return None
-        return np.hypot(self.sigma_shape_kgm3, self.scale * self.density_kgm3)
+        return total(self.sigma_shape_kgm3, self.scale, self.density_kgm3)
 
     def per_density(self, axis: str, time_s) -> np.ndarray:
         """Torque per density about an axis at times from closest approach, with its sign. (N,) [N m / (kg/m3)]"""
@@ -160,11 +166,11 @@ class DensityResult:
 
     def __str__(self) -> str:
         """What a person reads."""
-        p, scale = self.peak, f"{100 * self.scale:.1f} %"
+        p, scale = self.peak, "unknown" if self.scale is None else f"{100 * self.scale:.1f} %"
         lines = [
             f"Density · {self.craft} · {self.flyby.name} · {self.method}, {self.variant}, axis {self.axis} · closest approach {self.closest_approach}",
             f"  {len(self.time_s)} instants from {self.time_s[0]:+.0f} s to {self.time_s[-1]:+.0f} s · {', '.join(f'{k:+.4g}' for k in self.torque_per_density)} N m per kg/m3",
-            f"  peak      {_of(p.density_kgm3, p.sigma_kgm3)} kg/m3, shape {_share(p.sigma_shape_kgm3, p.density_kgm3)}, scale {scale}",
+            f"  peak      {_of(p.density_kgm3, p.sigma_kgm3 or p.sigma_shape_kgm3)} kg/m3, shape {_share(p.sigma_shape_kgm3, p.density_kgm3)}, scale {scale}",
             f"            at {_time(p.time_s, p.sigma_time_s)} s from closest approach, {_time(p.altitude_m / 1e3, _over(p.sigma_altitude_m, 1e3), '')} km high",
         ]
         if self.agreement is not None:
@@ -183,7 +189,7 @@ class DensityResult:
         modelled = "taken off" if self.gravity_gradient_Nm is not None else "not modelled"
         at_peak = float(np.interp(p.time_s, self.time_s, self.bound_kgm3))
         lines.append(
-            f"  left out  at most {at_peak:.2g} kg/m3 at the peak, {self.bound_kgm3.max():.2g} at most (gravity gradient {modelled})"
+            f"  left out  at most {at_peak:.2g} kg/m3 at the peak, {self.bound_kgm3[np.isfinite(self.bound_kgm3)].max():.2g} at most (gravity gradient {modelled})"
         )
         if self.atmosphere is not None:
             lines.append(f"  exponential  {self.atmosphere}")
@@ -197,6 +203,11 @@ class DensityResult:
         return "\n".join(lines)
 
 
+def total(shape, scale: float | None, density):
+    """Both errors together; None where one is not known. [kg/m3]"""
+    return None if shape is None or scale is None else np.hypot(shape, scale * density)
+
+
 def _of(value: float, sigma: float | None, form: str = ".3g") -> str:
     return f"{value:{form}}" if sigma is None else f"{value:{form}} ± {sigma:.2g}"
 
@@ -206,7 +217,7 @@ def _time(value: float, sigma: float | None, sign: str = "+") -> str:
 
 
 def _share(sigma: float | None, value: float) -> str:
-    return "unknown" if sigma is None else f"{100 * sigma / value:.1f} %"
+    return "unknown" if sigma is None else f"{100 * sigma / abs(value):.1f} %"
 
 
 def _over(value: float | None, by: float) -> float | None:

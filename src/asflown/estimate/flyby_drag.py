@@ -23,6 +23,8 @@ from .result import AXES
 #: What 004 judges its torque to be off by, and what else is (section VI): their root sum of squares is 7.73 %.
 PRINTED_SHAPE, PRINTED_SCALE = 0.05, 0.059
 _REACH_S = 1200.0  # speeds are followed for so long before and after closest approach
+#: What a table should hold: where jets are met; and by how much it may change from row to row, and its speed differ from the flyby's.
+_COVERS_S, _STEP, _UNLIKE = (-60.0, 160.0), 0.3, 0.2
 _UNITS = {"time": "s", "speed": "m/s", "area": "m2", "arm_x": "m", "arm_y": "m", "arm_z": "m"}
 _REMEDY = "Write a CSV with the header time [s],speed [m/s],area [m2],arm_x [m],arm_y [m],arm_z [m]: times from closest approach increasing; speed may be left out."
 
@@ -31,13 +33,13 @@ _REMEDY = "Write a CSV with the header time [s],speed [m/s],area [m2],arm_x [m],
 class DragAlong:
     """Torque per density (K, 3) [N m / (kg/m3)] at times from closest approach, lines between, its ends held beyond.
 
-    ``axes``: those about which gas turns the craft; ``signed``: whether the arm's sign is known; ``scale``: one sigma of all, as a share."""
+    ``axes``: those about which gas turns the craft; ``signed``: whether the arm's sign is known; ``scale``: one sigma of all, as a share; None where not known."""
 
     time_s: np.ndarray
     per_density: np.ndarray
     axes: tuple[int, ...]
     signed: bool
-    scale: float
+    scale: float | None
     settings: dict
     doubts: tuple[str, ...]
 
@@ -71,6 +73,7 @@ def flyby_drag(craft: Craft, flyby: Flyby, axis=None, area_m2=None, arm_m=None, 
             "the printed torque per density is that of E3 about z, with its own area and arm",
             remedy="Use --variant corrected.",
         )
+    scale: float | None
     scale, doubts = (PRINTED_SCALE, []) if printed else _scale(air)
     if table is not None:
         if area_m2 is not None or arm_m is not None:
@@ -86,6 +89,7 @@ def flyby_drag(craft: Craft, flyby: Flyby, axis=None, area_m2=None, arm_m=None, 
             raise BadInput(f"a {name} of {value:g} is not possible", remedy="Give a positive size.")
     area, arm = area_m2 or air.projected_area, arm_m or air.moment_arm
     if air.flyby and air.flyby != flyby.name and None in (area_m2, arm_m):
+        scale = None
         doubts.append(
             f"projected area and moment arm are those of the attitude at {air.flyby}, not at {flyby.name}: the density's scale is not known (--area, --arm)"
         )
@@ -136,11 +140,34 @@ def _from_table(path: Path, air: Aerodynamics, flyby: Flyby, axis, scale: float,
                 *doubts,
                 f"the arm about {AXES[j]} passes through zero: near there its torque says nothing of the density",
             ]
+    doubts = [*doubts, *_table_doubts(t, speed, k, flyby)]
     settings = {
         "drag_table": str(path), "drag_coefficient": air.drag_coefficient, "speed_m_s": [speed.min(), speed.max()],
         "projected_area_m2": [area.min(), area.max()], "table_from_s": t[0], "table_to_s": t[-1],
     }  # fmt: skip
     return DragAlong(t, k, axes, True, scale, settings, tuple(doubts))
+
+
+def _table_doubts(t, speed, k, flyby: Flyby) -> list[str]:
+    doubts = []
+    if t[0] > _COVERS_S[0] or t[-1] < _COVERS_S[1]:
+        doubts.append(
+            f"the drag table runs from {t[0]:+.0f} to {t[-1]:+.0f} s only: its first and last values are held beyond"
+        )
+    size = np.linalg.norm(k, axis=1)
+    change = np.linalg.norm(np.diff(k, axis=0), axis=1) / size.max()
+    if change.max() > _STEP:
+        i = int(np.argmax(change))
+        doubts.append(
+            f"the drag table changes by {100 * change[i]:.0f} % from {t[i]:+.0f} to {t[i + 1]:+.0f} s: lines stand for what is between (rows closer together)"
+        )
+    near = int(np.argmin(np.abs(t)))
+    unlike = float(speed[near] / flyby.speed(t[near]))
+    if abs(unlike - 1) > _UNLIKE:
+        doubts.append(
+            f"the drag table's speed is {unlike:.2g} times that of {flyby.name}: is it the right flyby, and unit?"
+        )
+    return doubts
 
 
 def _read(path: Path) -> dict[str, np.ndarray]:

@@ -29,7 +29,7 @@ from .jets_data import JetData, by_momentum, through_loop
 from .jets_printed import simplex
 from .jets_result import JetsResult, Score, Source
 from .jets_surface import WIDTHS_RAD, Surface
-from .subject import slews, thrusters_firing
+from .subject import check_on_times, slews, thrusters_firing
 
 WIDTHS, FITS = ("own", "common"), ("momentum", "forward", "printed")
 #: Combinations of widths grow as 44 to the power of the sources; densities not negative as 2 to it.
@@ -62,6 +62,7 @@ def jets(
             "thrusters fire in this record, and jets are fitted to the momentum of wheels",
             remedy="Use asflown density, which balances on-times.",
         )
+    check_on_times(telemetry, craft)
     where = flyby_called(flyby) if isinstance(flyby, str) else flyby
     sources = _wanted(where, names, sources)
     most = _MOST_OWN if widths == "own" else _MOST_COMMON
@@ -71,6 +72,14 @@ def jets(
             remedy="Use --widths common, or fewer sources.",
         )
     met = density(telemetry, craft, where, closest_approach, cusps=False, **drag)
+    for a in met.axis:
+        if fit != "forward" and f"body_rate_{a}" not in telemetry:
+            raise BadInput(
+                "jets are fitted to the momentum of wheels and body, and the body's is not known",
+                file=telemetry.source or None,
+                channel=f"body_rate_{a}",
+                remedy="Add the body rates.",
+            )
     closest_s = float(telemetry.seconds(telemetry.moment(closest_approach)))
     data = (
         through_loop(met, sources, closest_s)

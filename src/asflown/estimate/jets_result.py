@@ -134,7 +134,7 @@ class JetsResult:
         d, (peak, at) = self.density, self.peak
         lines = [
             f"Jets · {d.craft} · {d.flyby.name} · {self.widths} width{'s' if self.widths == 'own' else ''}, power {self.power:g} · closest approach {d.closest_approach}",
-            f"  {self.samples} samples{_OF[self.fit]}, worth {self.worth:.0f} · all densities ± {100 * d.scale:.1f} % together",
+            f"  {self.samples} samples{_OF[self.fit]}, worth {self.worth:.0f} · all densities {'on an unknown scale' if d.scale is None else f'± {100 * d.scale:.1f} % together'}",
             "              density [1e-12 kg/m3]                  width [rad]",
             *map(str, self.sources),
             f"  together     {1e12 * peak:.3g}e-12 at the most, at {at:+.0f} s; {1e12 * self.rms_kgm3:.2g}e-12 rms from the density reconstructed",

@@ -126,6 +126,20 @@ def thrusters_firing(telemetry: Telemetry) -> list[str]:
     return list(dict.fromkeys(c.member for c in channels if (np.diff(c.usable.values) > 0).any()))
 
 
+def check_on_times(telemetry: Telemetry, craft: Craft) -> None:
+    """Raises BadInput where the control mode says that thrusters hold the craft, and what they did is not in the record."""
+    mode = telemetry.channels.get("control_mode")
+    if mode is None or "RCS" not in mode.usable.values or thrusters_firing(telemetry):
+        return
+    first = craft.thrusters[0].name if craft.thrusters else "<THRUSTER>"
+    raise BadInput(
+        "thrusters hold the craft in this record, and how long each fired is not in it: their torque cannot be told from the surroundings'",
+        file=telemetry.source or None,
+        channel=f"on_time_{first}",
+        remedy=f"Add on_time_{first} and those of the others, cumulative in seconds (and pulse_count_{first}, … where they are known).",
+    )
+
+
 def gaps_on_grid(channel: Channel, grid: Grid) -> list[tuple[float, float]]:
     """Gaps of a channel, from the grid's start. [s]"""
     c = channel.usable

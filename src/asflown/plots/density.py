@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
+from itertools import cycle
+
 import numpy as np
 
 from ..dynamics.plume import jet_density
 from ..estimate.density_result import DensityResult
 from ..estimate.jets_result import JetsResult
-from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, new_figure, save, write_doubts
+from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, new_figure, save, write_doubts
 
 _PLUME_S = (-60.0, 180.0)  # where jets are met
 _HEIGHTS = 6  # scale heights of an atmosphere that are shown
 _SCALE = 1e12
+#: What a reader of a density must know before all else.
+_FIRST = (
+    "no gas is seen",
+    "do not explain",
+    "does not explain",
+    "scale is not known",
+    "is negative",
+    "may lie outside",
+    "gravity gradient is not",
+)
+#: Colours of sources, again from the first where there are more.
+OF_JETS = (GREEN, ORANGE, PURPLE, SKY, "black")
 
 
 def draw_density(result: DensityResult, ax):
@@ -83,7 +97,7 @@ def draw_jets(result: JetsResult, ax):
     """Density of the jets together and of each, as in 004 Figures 11 and 12.  Returns ax."""
     d = result.density
     ax.plot(d.time_s, _SCALE * result.model_kgm3, color=RED, linewidth=1.4, label="jets together")
-    for source, color in zip(result.sources, (GREEN, ORANGE, PURPLE), strict=False):
+    for source, color in zip(result.sources, cycle(OF_JETS)):
         rho = jet_density(source.jet, d.flyby, d.time_s, power=result.power, angle=result.angle)
         known = "" if source.density_known else " (not identified)"
         ax.plot(d.time_s, _SCALE * rho, color=color, linewidth=1.0, label=source.jet.name + known)
@@ -135,4 +149,4 @@ def finish(figure, ax, result: DensityResult, title: str, doubts) -> None:
     ax.legend(frameon=False, fontsize=8)
     ax.set_title(title, loc="left", fontsize=11)
     ax.set_xlabel(f"time from closest approach, {result.closest_approach} [s]")
-    write_doubts(figure, doubts)
+    write_doubts(figure, doubts, first=[d for d in doubts if any(w in d for w in _FIRST)])

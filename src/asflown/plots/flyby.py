@@ -6,10 +6,13 @@ components 11, model and reconstruction 12.  Time is from closest approach.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import cycle
+
 import numpy as np
 
 from ..craft.model import Craft
-from ..dynamics.plume import as_passed, published_jets
+from ..dynamics.plume import Jet, as_passed, published_jets
 from ..dynamics.trajectory import Trajectory
 from ..estimate.density_result import DensityResult
 from ..estimate.external_samples import samples_of
@@ -18,8 +21,18 @@ from ..estimate.result import AXES
 from ..estimate.subject import subject_of
 from ..kit.errors import BadInput
 from ..telemetry.telemetry import Telemetry
-from .density import draw_bound, draw_density, draw_jets, draw_published_peaks, finish, shown_s
-from .figure import BLUE, BY_AXIS, GREEN, GREY, ORANGE, PURPLE, RED, new_figure
+from .density import (
+    OF_JETS,
+    draw_bound,
+    draw_density,
+    draw_jets,
+    draw_noticed,
+    draw_peak,
+    draw_published_peaks,
+    finish,
+    shown_s,
+)
+from .figure import BLUE, BY_AXIS, GREEN, GREY, ORANGE, RED, new_figure
 
 #: Family of channels -> file name, label, what one SI unit is in it.
 _READINGS = {
@@ -29,14 +42,20 @@ _READINGS = {
 }
 
 
-def flyby_figures(result: DensityResult, telemetry: Telemetry, craft: Craft, jets: JetsResult | None = None) -> dict:
-    """Figures by file name; those whose channels or places are not known are left out."""
+def flyby_figures(
+    result: DensityResult,
+    telemetry: Telemetry,
+    craft: Craft,
+    jets: JetsResult | None = None,
+    sources: Sequence[Jet] | None = None,
+) -> dict:
+    """Figures by file name; those whose channels or places are not known are left out.  ``sources``: in place of the published."""
     closest_s = _closest(result, telemetry)
     figures = {}
     if result.flyby.latitude_south_rad is not None:
-        figures["geometry"] = _alone(draw_geometry, result, height=5.6, width=7.2)
+        figures["geometry"] = _alone(draw_geometry, result, sources, height=5.6, width=7.2)
     if result.flyby.longitude_west_rad is not None:
-        figures["geometry-pole"] = _alone(draw_from_pole, result, height=5.4, width=6.6)
+        figures["geometry-pole"] = _alone(draw_from_pole, result, sources, height=5.4, width=6.6)
     for stem, (name, label, scale) in _READINGS.items():
         if telemetry.has_axes(stem):
             figure, (ax,) = new_figure(1, height=3.4)
@@ -57,7 +76,9 @@ def flyby_figures(result: DensityResult, telemetry: Telemetry, craft: Craft, jet
     figure, (ax,) = new_figure(1, height=4.0)
     draw_density(result, ax)
     draw_bound(result, ax)
+    draw_noticed(result, ax)
     draw_published_peaks(result, ax)
+    draw_peak(result, ax)
     if result.atmosphere is not None:
         ax.plot(
             result.time_s,
@@ -66,13 +87,13 @@ def flyby_figures(result: DensityResult, telemetry: Telemetry, craft: Craft, jet
             linewidth=1.2,
             label="exponential",
         )
-    finish(figure, ax, result, f"Density, {result.flyby.name}", ())
+    finish(figure, ax, result, f"Density, {result.flyby.name}", result.doubts)
     figures["density"] = figure
     if jets is not None:
         figure, (ax,) = new_figure(1, height=4.0)
         draw_jets(jets, ax)
         ax.set_ylabel("density [10⁻¹² kg/m³]")
-        finish(figure, ax, result, f"Jets and their sum, {result.flyby.name}: power {jets.power:g}", ())
+        finish(figure, ax, result, f"Jets and their sum, {result.flyby.name}: power {jets.power:g}", jets.doubts)
         figures["components"] = figure
         figure, (ax,) = new_figure(1, height=4.0)
         draw_density(result, ax)
@@ -82,8 +103,10 @@ def flyby_figures(result: DensityResult, telemetry: Telemetry, craft: Craft, jet
     return figures
 
 
-def draw_geometry(result: DensityResult, ax):
+def draw_geometry(result: DensityResult, ax, sources: Sequence[Jet] | None = None):
     """Plane of trajectory and spin axis, to scale, north up: moon, jets with their widths, the path with 004's points.  Returns ax.
+
+    ``sources``: as the flyby passes them; those published unless given.
 
     P, Q, R: where the plume is first noticed, at its peak, last noticed; 004's own where they are published (E3)."""
     flyby, radius = result.flyby, result.flyby.moon.radius_m / 1e3
@@ -94,8 +117,7 @@ def draw_geometry(result: DensityResult, ax):
     path = _projected(flyby, np.linspace(start, stop, 50))
     far = float(np.abs(path).max())
     if flyby.moon.atmosphere is None and flyby.longitude_west_rad is not None:
-        for jet, color in zip(published_jets(), (GREEN, ORANGE, PURPLE), strict=True):
-            j = jet if flyby.name == "E3" else as_passed(jet, flyby)
+        for j, color in zip(_sources(flyby, sources), cycle(OF_JETS)):
             axis = np.array([np.sin(j.tilt_rad), -np.cos(j.tilt_rad)])
             source = radius * axis
             for side in (-j.width_rad, j.width_rad):
@@ -126,7 +148,7 @@ def draw_geometry(result: DensityResult, ax):
     return ax
 
 
-def draw_from_pole(result: DensityResult, ax):
+def draw_from_pole(result: DensityResult, ax, sources: Sequence[Jet] | None = None):
     """The south pole's surroundings seen from the south, to scale: sources, and the path projected along the spin axis.  Returns ax."""
     flyby, radius = result.flyby, result.flyby.moon.radius_m / 1e3
     turn = np.linspace(0, 2 * np.pi, 121)
@@ -144,7 +166,7 @@ def draw_from_pole(result: DensityResult, ax):
     inside = np.hypot(*path.T) <= reach
     ax.plot(*path[inside].T, color=BLUE, linewidth=1.6, label=f"trajectory {flyby.name}")
     if flyby.moon.atmosphere is None:
-        for jet, color in zip(published_jets(), (GREEN, ORANGE, PURPLE), strict=True):
+        for jet, color in zip(_sources(flyby, sources), cycle(OF_JETS)):
             w, out = jet.longitude_west_rad, radius * np.cos(jet.latitude_south_rad)
             ax.plot(out * np.cos(w), out * np.sin(w), "o", color=color, markersize=6, label=jet.name)
     peak = _from_south(flyby, result.peak.time_s)
@@ -240,9 +262,16 @@ def _ray(source, along, length: float):
     return [source[0], end[0]], [source[1], end[1]]
 
 
-def _alone(draw, result: DensityResult, **size):
+def _sources(flyby, sources: Sequence[Jet] | None) -> list[Jet]:
+    """Those given, or those published as the flyby passes them."""
+    if sources is not None:
+        return list(sources)
+    return [j if flyby.name == "E3" else as_passed(j, flyby) for j in published_jets()]
+
+
+def _alone(draw, result: DensityResult, sources, **size):
     figure, (ax,) = new_figure(1, **size)
-    draw(result, ax)
+    draw(result, ax, sources)
     return figure
 
 
@@ -260,13 +289,10 @@ def _timed(figure, ax, result: DensityResult, title: str):
 
 
 def _fit_height(ax, low: float, high: float) -> None:
-    """What lies outside the span shown does not set the scale."""
-    seen = np.concatenate(
-        [
-            np.asarray(y)[(np.asarray(x) >= low) & (np.asarray(x) <= high)]
-            for x, y in (line.get_data() for line in ax.lines)
-        ]
-    )
+    """What lies outside the span shown does not set the scale; bands count as lines do."""
+    drawn = [np.column_stack([np.asarray(v, float) for v in line.get_data()]) for line in ax.lines]
+    drawn += [path.vertices for band in ax.collections for path in band.get_paths()]
+    seen = np.concatenate([xy[(xy[:, 0] >= low) & (xy[:, 0] <= high), 1] for xy in drawn])
     seen = seen[np.isfinite(seen)]
     if len(seen) and np.ptp(seen) > 0:
         ax.set_ylim(seen.min() - 0.12 * np.ptp(seen), seen.max() + 0.22 * np.ptp(seen))

@@ -21,6 +21,7 @@ from .scenario import Passage, Plume
 
 #: One Runge-Kutta step: the curve, not its chords. [s]
 _STEP_S = 0.03125
+_BEYOND_S = 600.0  # closest approach may lie so far outside a record
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,11 @@ def passed(p: Passage, now: CraftAt, start_s: float, stop_s: float) -> Passed:
         )
     arm = 0.0 - air.moment_arm * np.eye(3)[AXES.index(air.axis)] if p.arm is None else np.array(p.arm)
     per_density = torque_per_density(air.drag_coefficient, where.speed_m_s, p.area or air.projected_area, arm)
+    if not start_s - _BEYOND_S <= p.closest_approach <= stop_s + _BEYOND_S:
+        raise BadInput(
+            f"closest approach at {p.closest_approach:g} s is far outside the record, which runs from {start_s:g} to {stop_s:g} s",
+            remedy="Set flyby.closest_approach within it.",
+        )
     t = np.arange(start_s, stop_s + _STEP_S, _STEP_S)
     since = t - p.closest_approach
     rho = _density(p, where, since)

@@ -123,7 +123,7 @@ class Passage(Part):
     closest_approach: Second
     altitude: Metre | None = Field(default=None, gt=0)  # at closest approach
     speed: MetrePerSecond | None = Field(default=None, gt=0)
-    latitude_south: Radian | None = None
+    latitude_south: Radian | None = Field(default=None, ge=-np.pi / 2, le=np.pi / 2)
     longitude_west: Radian | None = None
     jets: dict[str, float] | None = None  # those that blow and how strongly; all of Table 3, each once
     exponent: Literal[1, 2] = 1

@@ -24,6 +24,8 @@ _FEWEST = 4
 _UNITS = {"position": "m", "velocity": "m/s"}
 #: A velocity may differ from the positions' own by this share before it is taken for one of another frame or unit.
 _UNLIKE = 0.05
+#: And between two rows by this, before one of them is wrong.
+_GLITCH = 0.2
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,13 @@ def _read(path: Path) -> TrajectoryTable:
         raise BadInput(
             f"its velocities are not those of its positions (they differ by {100 * np.median(off):.0f} %)",
             remedy="Give both in axes fixed to the body, with their units, and rows no more than some seconds apart.",
+        )
+    if off.max() > _GLITCH:
+        k = int(np.argmax(off))
+        raise BadInput(
+            f"between this row and the next the craft would move at another velocity than the two say ({100 * off[k]:.0f} % off)",
+            line=table.line(k),
+            remedy="Correct the row, or leave it out.",
         )
     return TrajectoryTable(tai_ns, origin is not None or scale != "s", r, v, sha256_of(data))
 
