@@ -269,7 +269,7 @@ def _peak(time_s, rho, sigma, scale, flyby, known, drawn_s, drawn, cusps: DrawnP
             "of jets and a remainder",
         )
         shape, when = float(spread(cusps.density_kgm3)), float(spread(cusps.time_s))
-        when = float(np.hypot(when, TIME_STEP_S / np.sqrt(12)))  # all draws on one step do not make it exact
+        when = float(np.hypot(when, TIME_STEP_S / 2))  # all draws on one step do not make it exact
     elif drawn is not None and sigma is not None:
         inside = (drawn_s >= time_s[known][0]) & (drawn_s <= time_s[known][-1]) & np.isfinite(drawn).all(axis=0)
         tops = drawn_s[inside][np.argmax(drawn[:, inside], axis=1)]
