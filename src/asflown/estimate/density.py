@@ -392,5 +392,7 @@ def _cusp_doubts(peak: DensityPeak, found: DrawnPeaks | None) -> list[str]:
             "jets near the sources named do not explain the density: its peak is that of a smooth curve, early at a cusp"
         ]
     if found.leaning_probability > 0.9:
-        return ["jets from the sources named explain the density only where they lean, or stand elsewhere"]
+        return [
+            "jets from the sources named explain the density only where they lean, or stand elsewhere: with a wrong source a simulated E4's peak came out 8 % low and 1.5 s early, five times its sigma"
+        ]
     return []

@@ -20,6 +20,7 @@ _FIRST = (
     "do not explain",
     "does not explain",
     "scale is not known",
+    "the sources named",
     "is negative",
     "may lie outside",
     "gravity gradient is not",
