@@ -397,6 +397,9 @@ def test_the_default_falls_back_to_momentum_where_fused_cannot_be_used():
     wheels = replace(tlm, channels={n: c for n, c in tlm.channels.items() if n.startswith("wheel_rate")})
     r = disturbance_torque(wheels, CASSINI, axis="y")
     assert r.method == "momentum" and "the fused method cannot be used (body_rate_y" in r.doubts[0]
+    errors = replace(tlm, channels={n: c for n, c in tlm.channels.items() if n.startswith("attitude_error")})
+    r = disturbance_torque(errors, CASSINI, axis="y")
+    assert r.method == "transfer" and "this is the transfer method" in r.doubts[0]
     with pytest.raises(BadInput, match="body_rate"):
         fused(wheels)
     assert disturbance_torque(tlm, CASSINI, axis="y", window_s=40).method == "momentum"

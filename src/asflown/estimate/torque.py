@@ -78,10 +78,11 @@ def disturbance_torque(
         except BadInput as why:
             if not free or chosen:
                 raise
-            method = "momentum"  # what asks for less; where it too is asked too much, its complaint is the plainer one
+            # what asks for less; where it too is asked too much, its complaint is the plainer one
+            method = "transfer" if _attitude_alone(telemetry) else "momentum"
             answer = _run(subject, method, variant, axis, model, order, window_s, (prior, loop, considered))
             where = f"{why.channel}: " if why.channel else ""
-            beforehand.append(f"the fused method cannot be used ({where}{why.what}): this is the momentum method")
+            beforehand.append(f"the fused method cannot be used ({where}{why.what}): this is the {method} method")
     except BadInput as why:
         raise why.within(telemetry.source) from why.__cause__
     grid, torque, sigma, momentum, settings, doubts, fits, *drawn = answer
@@ -112,6 +113,12 @@ def disturbance_torque(
     ready = {method: answer} if variant == "corrected" and sigma is not None else {}
     doubts += _consistency(subject, ready)
     return _with_doubts(result, doubts)
+
+
+def _attitude_alone(telemetry: Telemetry) -> bool:
+    """Whether nothing is told of what the actuators did, and the attitude's error is."""
+    stems = {c.kind.stem for c in telemetry.channels.values()}
+    return "attitude_error" in stems and not stems & {"wheel_rate", "wheel_momentum", "control_torque"}
 
 
 def _run(subject: Subject, method, variant, axis, model, order, window_s, of_fused):
