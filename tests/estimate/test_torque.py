@@ -302,3 +302,14 @@ def test_polynomial_misfit_falls_with_the_order():
     rms = [f["rms_Nms"] for f in r.fits if f["channel"] == "momentum" and f["axis"] == "y"]
     assert len(rms) == 3 and rms[0] > rms[1] > rms[2]
     assert {f["order"] for f in r.fits} == {6, 12, 15, 18}
+
+
+def test_a_record_in_which_nothing_changes_is_doubted():
+    tlm = fly("quiet", seed=1).telemetry
+    frozen = {
+        n: c if c.kind.behaves == "state" else replace(c, values=np.full_like(c.values, c.values[0]))
+        for n, c in tlm.channels.items()
+    }
+    r = disturbance_torque(replace(tlm, channels=frozen), CASSINI, axis="y")
+    assert any("not one channel changes" in d for d in r.doubts)
+    assert not any("not one channel changes" in d for d in disturbance_torque(tlm, CASSINI, axis="y").doubts)

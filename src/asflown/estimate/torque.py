@@ -107,12 +107,29 @@ def disturbance_torque(
         paths_Nm=drawn[0] if drawn else None,
         evidence=drawn[1] if drawn else {},
     )
-    doubts = [*beforehand, *subject.doubts, *doubts, *_thruster_doubts(subject), *_relative_doubts(subject, result)]
+    doubts = [
+        *beforehand,
+        *subject.doubts,
+        *doubts,
+        *_still_doubts(telemetry),
+        *_thruster_doubts(subject),
+        *_relative_doubts(subject, result),
+    ]
     if method == "momentum" and variant == "corrected":
         doubts += _smoothing_doubts(result, settings["half_width_s"])
     ready = {method: answer} if variant == "corrected" and sigma is not None else {}
     doubts += _consistency(subject, ready)
     return _with_doubts(result, doubts)
+
+
+def _still_doubts(telemetry: Telemetry) -> list[str]:
+    stems = ("wheel_rate", "wheel_momentum", "control_torque", "body_rate", "attitude_error")
+    said = [c.usable.values for c in telemetry.channels.values() if c.kind.stem in stems]
+    if any(len(v) == 0 or np.ptp(v) > 0 for v in said):
+        return []
+    return [
+        "not one channel changes in this record: dead sensors or a frozen frame; the torque says nothing, nor does its sigma"
+    ]
 
 
 def _attitude_alone(telemetry: Telemetry) -> bool:
