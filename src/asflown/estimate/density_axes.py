@@ -35,10 +35,14 @@ def agreement_of(each, sigma, rho, known) -> Agreement | None:
     How alike neighbours are is learnt where no gas is seen: amid it a disagreement itself would make them so."""
     if sigma is None or each.shape[1] < 2:
         return None
-    left = np.where(np.isfinite(each) & (sigma > 0), (each - rho[:, None]) / sigma, 0.0)
+    told = np.isfinite(each) & np.isfinite(sigma) & (sigma > 0)  # an axis without an arm tells nothing
+    sigma = np.where(told, sigma, np.inf)
+    each, common = np.where(told, each, 0.0), np.nan_to_num(rho)[:, None]
+    left = (each - common) / sigma
     quiet = np.abs(each / sigma).max(axis=1) < _SEEN
     alike = max(memory(column[quiet if quiet.sum() > 50 else slice(None)]) for column in left.T)
-    return Agreement(float(np.sum(left[known] ** 2)) / alike, int(known.sum()) * (each.shape[1] - 1) / alike)
+    beside = int(np.maximum(told[known].sum(axis=1) - 1, 0).sum())
+    return Agreement(float(np.sum(left[known] ** 2)) / alike, beside / alike) if beside else None
 
 
 def drawn_densities(torque: TorqueResult, axes, middle: float, time_s, K, weight, gravity):

@@ -12,6 +12,7 @@ from ..estimate.jets_result import JetsResult
 from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, new_figure, save, write_doubts
 
 _PLUME_S = (-60.0, 180.0)  # where jets are met
+_TALL = 4  # of the tallest peak: an axis of so many has nothing to do with gas
 _HEIGHTS = 6  # scale heights of an atmosphere that are shown
 _SCALE = 1e12
 #: What a reader of a density must know before all else.
@@ -138,6 +139,18 @@ def shown_s(result: DensityResult) -> tuple[float, float]:
     return max(low, float(result.time_s[0])), min(high, float(result.time_s[-1]))
 
 
+def _fit_height(ax, result: DensityResult) -> None:
+    """Where an arm passes through zero, bound and band grow beyond all gas: they do not set the scale."""
+    p = result.peak
+    heights = [
+        p.density_kgm3 + 1.96 * (p.sigma_shape_kgm3 or 0.0),
+        *(b.published.density_kgm3[1] for b in result.beside),
+    ]
+    tallest, (low, high) = _SCALE * max(heights), ax.get_ylim()
+    if 0 < _TALL * tallest < high - low:
+        ax.set_ylim(max(low, -0.4 * tallest), min(high, 1.4 * tallest))
+
+
 def finish(figure, ax, result: DensityResult, title: str, doubts) -> None:
     """Span shown, altitude along the top, legend, title, doubts beneath."""
     low, high = shown_s(result)
@@ -147,6 +160,7 @@ def finish(figure, ax, result: DensityResult, title: str, doubts) -> None:
         top = ax.secondary_xaxis("top")
         top.set_xticks(ticks, [f"{result.flyby.altitude(v) / 1e3:.0f}" for v in ticks])
         top.set_xlabel("altitude [km]")
+    _fit_height(ax, result)
     ax.legend(frameon=False, fontsize=8)
     ax.set_title(title, loc="left", fontsize=11)
     ax.set_xlabel(f"time from closest approach, {result.closest_approach} [s]")
