@@ -22,6 +22,7 @@ _FIRST = (
     "does not explain",
     "scale is not known",
     "the sources named",
+    "from on-times a cusp",
     "is negative",
     "may lie outside",
     "gravity gradient is not",
