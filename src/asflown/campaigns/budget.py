@@ -27,8 +27,8 @@ DEFAULT_METHODS = ("momentum-printed", "transfer-printed", "momentum", "transfer
 
 #: Within this of a true peak counts as at the corner. [s]
 _CORNER_S = 2.0
-#: A number with its sign and exponent, not one within a name.
-_NUMBER = re.compile(r"(?<![\w-])[+−-]?\d[\d.,]*(?:e[+-]?\d+)?(?![\w-])")
+#: A number, not one within a name.
+_NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[+-]?\d+)?(?!\w)")
 _SIGMAS = {0.68: 1.0, 0.95: 1.96}
 
 
