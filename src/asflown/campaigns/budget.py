@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -63,7 +63,7 @@ class BudgetRow:
     peak_coverage_95: Figure | None
     peak_error_percent: tuple[Figure, ...]
     failed: int
-    doubts: tuple[str, ...] = ()  # each with the number of flights that had it
+    doubts: tuple[str, ...]  # each with the number of flights that had it
 
     def record(self) -> dict:
         row: dict = {"method": self.method, "failed": self.failed}
@@ -122,7 +122,7 @@ def error_budget(
                 failed[i] += 1
             tick()
     return [
-        replace(_row(name, samples, f), doubts=_said(said, runs))
+        _row(name, samples, f, _said(said, runs))
         for name, samples, f, said in zip(methods, found, failed, doubted, strict=True)
     ]
 
@@ -180,7 +180,7 @@ def _inside(result: TorqueResult, axis: int, true: np.ndarray, share: float) -> 
     return np.abs(result.torque_Nm[:, axis] - true) < _SIGMAS[share] * sigma[:, axis]
 
 
-def _row(name: str, samples: list[dict], failed: int) -> BudgetRow:
+def _row(name: str, samples: list[dict], failed: int, doubts: tuple[str, ...]) -> BudgetRow:
     def figure(key: str) -> Figure:
         return Figure.of([s[key] for s in samples])
 
@@ -190,7 +190,7 @@ def _row(name: str, samples: list[dict], failed: int) -> BudgetRow:
     peaks = np.array([s["peaks"] for s in samples]) if samples else np.empty((0, 0))
     return BudgetRow(
         name, figure("rms"), figure("lag"), figure("peak_lag"), maybe("in68"), maybe("in95"), maybe("corner"), maybe("peak95"),
-        tuple(Figure.of(column) for column in peaks.T), failed,
+        tuple(Figure.of(column) for column in peaks.T), failed, doubts,
     )  # fmt: skip
 
 

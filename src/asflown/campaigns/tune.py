@@ -90,13 +90,18 @@ def tune(
     ]
 
 
+def best_of(rows: Sequence[SpanRow]) -> SpanRow:
+    """What the papers' search settles on: the least of the largest mean errors."""
+    return min(rows, key=lambda r: r.worst_percent)
+
+
 def remarks(rows: Sequence[SpanRow]) -> list[str]:
     """What the search says, and what it does not."""
     found = [
         "the best span is the one at which smoothing takes off what leaving I w out puts on: it holds for these widths and "
         "this record length only"
     ]
-    best = min(rows, key=lambda r: r.worst_percent)
+    best = best_of(rows)
     papers = next((r for r in rows if abs(r.span - PAPERS_SPAN) < 1e-9), None)
     if papers is not None and best is not papers:
         found.append(

@@ -96,9 +96,7 @@ def jets(
         from asflown.plots.figure import save_figures
         from asflown.plots.flyby import flyby_figures
 
-        for path in save_figures(
-            flyby_figures(result.density, telemetry, ship, result, [s.jet for s in result.sources]), plot_dir
-        ):
+        for path in save_figures(flyby_figures(result.density, telemetry, ship, result), plot_dir):
             say(f"wrote {path}")
     if json:
         options = {"craft": craft, "flyby": result.density.flyby.name, "closest_approach": closest_approach, "axis": axis, "method": method,

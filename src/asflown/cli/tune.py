@@ -19,14 +19,13 @@ def tune(
     json: bool = JSON,
 ) -> None:
     """Search the printed method's smoothing span as the paper did, and show what the best one balances."""
-    from asflown.campaigns.tune import SPANS, remarks, tune
+    from asflown.campaigns.tune import SPANS, best_of, remarks, tune
 
     ship = craft_from(craft, inertia, cm)
     rises = numbers_of(widths, "--widths")
     shares = numbers_of(spans, "--spans") if spans else list(SPANS)
     rows = tune(ship, rises=rises, spans=shares, runs=runs, noise=noise)
-    said = remarks(rows)
-    best = min(rows, key=lambda r: r.worst_percent)
+    best, said = best_of(rows), remarks(rows)
     if json:
         options = {
             "spans": shares,

@@ -76,6 +76,11 @@ def as_passed(jet: Jet, flyby: Flyby) -> Jet:
     return replace(jet, tilt_rad=tilt(flyby, *place), offset_m=offset(flyby, *place))
 
 
+def sources_passed(flyby: Flyby, given: Sequence[Jet] | None = None) -> list[Jet]:
+    """Sources as a flyby passes them: those given, which are so already, or those published."""
+    return [as_passed(j, flyby) for j in published_jets()] if given is None else list(given)
+
+
 def seen_from(jet: Jet, flyby: Flyby, time_s, *, variant: str = "corrected", angle: str = "plane"):
     """Distance r [m] of the craft from a jet's source and angle theta [rad] from its axis.   004 eq 23
 

@@ -24,7 +24,7 @@ import numpy as np
 from ..craft.model import Craft
 from ..dynamics.environment import gravity_gradient, gravity_gradient_bound
 from ..dynamics.flyby import Flyby, flyby_called, published_peaks
-from ..dynamics.plume import FARTHEST_M, Jet, as_passed, published_jets
+from ..dynamics.plume import FARTHEST_M, Jet, sources_passed
 from ..kit.errors import BadInput, some_of
 from ..kit.timeline import utc_label
 from ..telemetry.telemetry import Telemetry
@@ -109,6 +109,7 @@ def density(
         )
     check_on_times(telemetry, craft)
     about = drag.names if len(drag.axes) == 1 else "all"
+    firing = thrusters_firing(telemetry)
     bodiless = [a for a in drag.names if f"body_rate_{a}" not in telemetry]
     if (
         bodiless
@@ -116,10 +117,10 @@ def density(
         and not printed
         and f"attitude_error_{bodiless[0]}" in telemetry
         and craft.wheel_controller is not None
-        and not thrusters_firing(telemetry)
+        and not firing
     ):
         method = "transfer"  # answers to the body's motion too, as wheels alone do not
-    if not printed and (method == "on-times" or (method is None and thrusters_firing(telemetry))):
+    if not printed and (method == "on-times" or (method is None and firing)):
         if about == "all":
             raise BadInput(
                 f"on-times tell the torque about one axis at a time, and gas turns the craft about {', '.join(drag.names)}",
@@ -242,7 +243,7 @@ def density(
 
 
 def _cusps(torque, drag: DragAlong, sign, flyby, middle, gravity, time_s, sources) -> DrawnPeaks:
-    known = [as_passed(j, flyby) for j in published_jets()] if sources is None else list(sources)
+    known = sources_passed(flyby, sources)
     data, per_density = [], []
     for i, j in enumerate(drag.axes):
         a = torque.evidence[AXES[j]]

@@ -20,7 +20,7 @@ from scipy.stats import f as fisher
 
 from ..craft.model import Craft
 from ..dynamics.flyby import Flyby, flyby_called
-from ..dynamics.plume import Jet, as_passed, jet_density, model_error, plume_density, published_jets
+from ..dynamics.plume import Jet, jet_density, model_error, plume_density, sources_passed
 from ..kit.errors import BadInput, some_of
 from ..kit.regression import memory
 from ..telemetry.telemetry import Telemetry
@@ -131,7 +131,7 @@ def jets(
 
 def _wanted(flyby: Flyby, names, sources) -> list[Jet]:
     """The sources to fit, as the flyby passes them."""
-    every = [as_passed(j, flyby) for j in published_jets()] if sources is None else list(sources)
+    every = sources_passed(flyby, sources)
     called = {j.name.casefold(): j.name for j in every}
     wanted = [j.name for j in every] if names is None else [called.get(n.casefold(), n) for n in names]
     if not wanted or len(set(wanted)) != len(wanted) or not set(wanted) <= {j.name for j in every}:

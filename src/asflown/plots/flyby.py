@@ -12,7 +12,7 @@ from itertools import cycle
 import numpy as np
 
 from ..craft.model import Craft
-from ..dynamics.plume import Jet, as_passed, published_jets
+from ..dynamics.plume import Jet, sources_passed
 from ..dynamics.trajectory import Trajectory
 from ..estimate.density_result import DensityResult
 from ..estimate.external_samples import samples_of
@@ -49,8 +49,10 @@ def flyby_figures(
     jets: JetsResult | None = None,
     sources: Sequence[Jet] | None = None,
 ) -> dict:
-    """Figures by file name; those whose channels or places are not known are left out.  ``sources``: in place of the published."""
+    """Figures by file name; those whose channels or places are not known are left out.  ``sources``: in place of the published; those of ``jets`` where they are fitted."""
     closest_s = _closest(result, telemetry)
+    if jets is not None:
+        sources = [s.jet for s in jets.sources]
     figures = {}
     if result.flyby.latitude_south_rad is not None:
         figures["geometry"] = _alone(draw_geometry, result, sources, height=5.6, width=7.2)
@@ -117,7 +119,7 @@ def draw_geometry(result: DensityResult, ax, sources: Sequence[Jet] | None = Non
     path = _projected(flyby, np.linspace(start, stop, 50))
     far = float(np.abs(path).max())
     if flyby.moon.atmosphere is None and flyby.longitude_west_rad is not None:
-        for j, color in zip(_sources(flyby, sources), cycle(OF_JETS)):
+        for j, color in zip(sources_passed(flyby, sources), cycle(OF_JETS)):
             axis = np.array([np.sin(j.tilt_rad), -np.cos(j.tilt_rad)])
             source = radius * axis
             for side in (-j.width_rad, j.width_rad):
@@ -166,7 +168,7 @@ def draw_from_pole(result: DensityResult, ax, sources: Sequence[Jet] | None = No
     inside = np.hypot(*path.T) <= reach
     ax.plot(*path[inside].T, color=BLUE, linewidth=1.6, label=f"trajectory {flyby.name}")
     if flyby.moon.atmosphere is None:
-        for jet, color in zip(_sources(flyby, sources), cycle(OF_JETS)):
+        for jet, color in zip(sources_passed(flyby, sources), cycle(OF_JETS)):
             w, out = jet.longitude_west_rad, radius * np.cos(jet.latitude_south_rad)
             ax.plot(out * np.cos(w), out * np.sin(w), "o", color=color, markersize=6, label=jet.name)
     peak = _from_south(flyby, result.peak.time_s)
@@ -260,13 +262,6 @@ def _from_south(flyby, time_s) -> np.ndarray:
 def _ray(source, along, length: float):
     end = source + length * along
     return [source[0], end[0]], [source[1], end[1]]
-
-
-def _sources(flyby, sources: Sequence[Jet] | None) -> list[Jet]:
-    """Those given, or those published as the flyby passes them."""
-    if sources is not None:
-        return list(sources)
-    return [j if flyby.name == "E3" else as_passed(j, flyby) for j in published_jets()]
 
 
 def _alone(draw, result: DensityResult, sources, **size):
