@@ -14,10 +14,11 @@ import time
 import numpy as np
 from scipy import optimize
 
-from asflown.estimate.gates_fit import problems
-from asflown.estimate.gates_likelihood import Problem
+from asflown.estimate.gates.fit import problems
+from asflown.estimate.gates.likelihood import Problem
 from asflown.maneuvers.history import past_model
-from asflown.sim.maneuver_sets import MAIN_ENGINE_SET, execute
+from asflown.sim.maneuver_sets import MAIN_ENGINE_SET
+from asflown.sim.maneuver_sets import execute
 
 REFITS = 1000
 

@@ -18,9 +18,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from asflown.estimate.gates_fit import fit_gates
+from asflown.estimate.gates.fit import fit_gates
 from asflown.maneuvers.history import past_model
-from asflown.sim.maneuver_sets import MAIN_ENGINE_SET, RCS_SET, Tracking, execute
+from asflown.sim.maneuver_sets import MAIN_ENGINE_SET
+from asflown.sim.maneuver_sets import RCS_SET
+from asflown.sim.maneuver_sets import Tracking
+from asflown.sim.maneuver_sets import execute
 
 SETS = {"main-engine": MAIN_ENGINE_SET, "rcs": RCS_SET}
 #: Orbit determination that sees small burns no better than large ones.

@@ -15,10 +15,11 @@ import argparse
 
 import numpy as np
 
-from asflown.estimate.gates_power import alarm_chance
-from asflown.estimate.gates_watch import watch_maneuvers
+from asflown.estimate.gates.power import alarm_chance
+from asflown.estimate.gates.watch import watch_maneuvers
 from asflown.maneuvers.history import past_model
-from asflown.sim.maneuver_sets import A_BRANCH_END, a_branch
+from asflown.sim.maneuver_sets import A_BRANCH_END
+from asflown.sim.maneuver_sets import a_branch
 
 FIRST, SMALL, LAST = A_BRANCH_END
 

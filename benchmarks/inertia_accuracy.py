@@ -22,13 +22,17 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from asflown.craft.load import load_craft
-from asflown.dynamics.rigid_body import ELEMENTS, elements_of
-from asflown.estimate.inertia import RATE_SCALE, WHEEL_SCALE, inertia_tensor
-from asflown.estimate.slew_fit import fit_slews
-from asflown.estimate.slew_record import slew_record
-from asflown.estimate.subject import subject_of
-from asflown.sim.fly import fly
-from asflown.sim.sensors import NOISE, stream
+from asflown.dynamics.rigid_body import ELEMENTS
+from asflown.dynamics.rigid_body import elements_of
+from asflown.estimate.inertia.record import slew_record
+from asflown.estimate.inertia.tensor import RATE_SCALE
+from asflown.estimate.inertia.tensor import WHEEL_SCALE
+from asflown.estimate.inertia.tensor import inertia_tensor
+from asflown.estimate.inertia.whole_motion import fit_slews
+from asflown.estimate.subject.subject import subject_of
+from asflown.sim.flight.closed_loop import fly
+from asflown.sim.flight.sensors import NOISE
+from asflown.sim.flight.sensors import stream
 
 CONDITIONS = {
     "nominal": {},

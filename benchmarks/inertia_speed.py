@@ -24,13 +24,16 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from asflown.craft.load import load_craft
-from asflown.estimate.inertia import inertia_tensor
-from asflown.estimate.slew_fit import carried, fit_slews, solved
-from asflown.estimate.slew_model import instants, linearized
-from asflown.estimate.slew_record import slew_record
-from asflown.estimate.subject import subject_of
+from asflown.estimate.inertia.motion import instants
+from asflown.estimate.inertia.motion import linearized
+from asflown.estimate.inertia.record import slew_record
+from asflown.estimate.inertia.tensor import inertia_tensor
+from asflown.estimate.inertia.whole_motion import carried
+from asflown.estimate.inertia.whole_motion import fit_slews
+from asflown.estimate.inertia.whole_motion import solved
+from asflown.estimate.subject.subject import subject_of
 from asflown.kit.regressed import run
-from asflown.sim.fly import fly
+from asflown.sim.flight.closed_loop import fly
 
 
 def numpy_innovations(s) -> np.ndarray:

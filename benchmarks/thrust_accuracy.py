@@ -27,10 +27,15 @@ import numpy as np
 
 from asflown.craft.load import load_craft
 from asflown.dynamics.pulses import Valve
-from asflown.estimate.thrust import thrust
-from asflown.estimate.thrust_priors import CENTER_SIGMA, FALL, FALL_SIGMA, MASS_SHARE, UNLIKE, priors_for
-from asflown.sim.fly import fly
-from asflown.sim.scenario import load_scenario
+from asflown.estimate.firing.priors import CENTER_SIGMA
+from asflown.estimate.firing.priors import FALL
+from asflown.estimate.firing.priors import FALL_SIGMA
+from asflown.estimate.firing.priors import MASS_SHARE
+from asflown.estimate.firing.priors import UNLIKE
+from asflown.estimate.firing.priors import priors_for
+from asflown.estimate.thrust.methods import thrust
+from asflown.sim.flight.closed_loop import fly
+from asflown.sim.scenario.scenario import load_scenario
 
 BASE, THRUST, MASS = load_craft("cassini", cm=(0, 0, 1.35)), 0.7, 3160.0
 CASES = {

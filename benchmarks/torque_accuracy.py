@@ -27,19 +27,24 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import numpy as np
 from scipy import signal
 
-from asflown import disturbance_torque, fly, load_craft
-from asflown.estimate.compare import best_lag
-from asflown.estimate.corners import draw_torques
-from asflown.estimate.curves import gaussian_torque
-from asflown.estimate.latent import Series, arrange, step_of
-from asflown.estimate.latent_loop import HeldBody, LoopLevels
-from asflown.estimate.levels import fit_levels
-from asflown.estimate.peaks import PEAK_REACH_S
-from asflown.estimate.torque_fused import CONSIDERED
+from asflown import disturbance_torque
+from asflown import fly
+from asflown import load_craft
+from asflown.estimate.fused.corners import draw_torques
+from asflown.estimate.fused.fuse import CONSIDERED
+from asflown.estimate.fused.held_body import HeldBody
+from asflown.estimate.fused.held_body import LoopLevels
+from asflown.estimate.fused.levels import fit_levels
+from asflown.estimate.fused.peaks import PEAK_REACH_S
+from asflown.estimate.fused.series import Series
+from asflown.estimate.fused.series import arrange
+from asflown.estimate.fused.series import step_of
+from asflown.estimate.fused.smooth_torque import gaussian_torque
+from asflown.estimate.torque.compare import best_lag
 from asflown.kit.ensemble import simulate
 from asflown.kit.errors import BadInput
 from asflown.kit.smoother import smooth
-from asflown.sim.scenario import load_scenario
+from asflown.sim.scenario.scenario import load_scenario
 
 PROFILES = ("profile-1", "profile-2")
 #: Condition -> changes to the scenario; noise, inertia, drawn, spikes and loop are not scenario keys.  Drawn: what is believed of the craft is

@@ -13,11 +13,18 @@ from skmisc.loess import loess
 from statsmodels.tsa.statespace import kalman_filter, kalman_smoother
 
 import asflown
-from asflown.estimate.latent import ATTITUDE_ERROR, BODY_RATE, MOMENTUM, Series, arrange
-from asflown.estimate.latent_loop import HeldBody, LoopLevels
+from asflown.estimate.fused.held_body import HeldBody
+from asflown.estimate.fused.held_body import LoopLevels
+from asflown.estimate.fused.series import ATTITUDE_ERROR
+from asflown.estimate.fused.series import BODY_RATE
+from asflown.estimate.fused.series import MOMENTUM
+from asflown.estimate.fused.series import Series
+from asflown.estimate.fused.series import arrange
 from asflown.kit.ensemble import simulate
 from asflown.kit.regression import local_polynomial
-from asflown.kit.smoother import Measurements, Model, smooth
+from asflown.kit.smoother import Measurements
+from asflown.kit.smoother import Model
+from asflown.kit.smoother import smooth
 
 _DAY_S = 86_400
 _CADENCE_S = {ATTITUDE_ERROR: 2, BODY_RATE: 4, MOMENTUM: 4}

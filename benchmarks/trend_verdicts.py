@@ -25,7 +25,8 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import numpy as np
 
-from asflown.trends.entry import Entry, Value
+from asflown.trends.entry import Entry
+from asflown.trends.entry import Value
 from asflown.trends.verdicts import judge
 
 DATES = (
@@ -133,10 +134,10 @@ def campaign(pool, runs: int, only: list[str]) -> dict:
 def flown(seed: int) -> dict:
     """A mission flown in the closed loop, analysed from its telemetry and judged; the truth beside the answer."""
     from asflown.craft.load import load_craft
-    from asflown.sim.fly_mission import fly_mission
-    from asflown.sim.mission import load_mission
-    from asflown.trends.analyse import analyse
-    from asflown.trends.events import load_events
+    from asflown.sim.mission.flown import fly_mission
+    from asflown.sim.mission.mission import load_mission
+    from asflown.trends.entries.actuation import analyse
+    from asflown.trends.entries.events import load_events
 
     with tempfile.TemporaryDirectory() as folder:
         fly_mission(load_mission("cassini-mission"), folder, seed=seed)

@@ -50,9 +50,11 @@ from itertools import count
 
 import numpy as np
 
-from asflown import disturbance_torque, fly, load_craft
-from asflown.estimate import corners
-from asflown.sim.scenario import load_scenario
+from asflown import disturbance_torque
+from asflown import fly
+from asflown import load_craft
+from asflown.estimate.fused import corners
+from asflown.sim.scenario.scenario import load_scenario
 
 
 def roughness(length_s: float) -> dict:

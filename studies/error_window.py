@@ -2,7 +2,7 @@
 
 Run: python studies/error_window.py [flights]
 
-Answer, 2026-11: a half-width of 18 s, hence ERROR_HALF_WIDTH_S in estimate/torque_transfer.py.  RMS
+Answer, 2026-11: a half-width of 18 s, hence ERROR_HALF_WIDTH_S in estimate/torque/transfer.py.  RMS
 error is least at 20 s on 15-s triangles (1.1 mN m) and flat from there on 30-s ones (0.9 to 1.0); each
 second of width costs another 1 % of a 15-s peak, so a little less than 20 s is taken.  The second
 derivative of 5 microrad of white noise at 2 s forbids much less.
@@ -12,8 +12,9 @@ import sys
 
 import numpy as np
 
-from asflown import fly, load_craft
-from asflown.estimate import torque_transfer
+from asflown import fly
+from asflown import load_craft
+from asflown.estimate.torque import transfer as torque_transfer
 
 sys.path.insert(0, __file__.rsplit("/", 1)[0])
 from momentum_window import errors

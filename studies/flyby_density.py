@@ -15,8 +15,8 @@ import sys
 import numpy as np
 
 from asflown.craft.load import load_craft
-from asflown.estimate.density import density
-from asflown.sim.fly import fly
+from asflown.estimate.density.along_flyby import density
+from asflown.sim.flight.closed_loop import fly
 
 HELD = {"velocity_B": (0, 1, 0), "up_B": (1, 0, 0)}
 KINDS = {

@@ -24,8 +24,15 @@ from asflown.dynamics.environment import gravity_gradient
 from asflown.dynamics.momentum import stored_momentum
 from asflown.kit.regression import local_polynomial
 from asflown.kit.rotations import rotation
-from asflown.kit.timeline import NS, segments
-from asflown.plots.figure import BLUE, GREY, ORANGE, RED, breaks, new_figure, save
+from asflown.kit.timeline import NS
+from asflown.kit.timeline import segments
+from asflown.plots.figure import BLUE
+from asflown.plots.figure import GREY
+from asflown.plots.figure import ORANGE
+from asflown.plots.figure import RED
+from asflown.plots.figure import breaks
+from asflown.plots.figure import new_figure
+from asflown.plots.figure import save
 from asflown.telemetry.attitude import together
 from asflown.telemetry.screening import noise_sigma
 

@@ -16,8 +16,8 @@ import sys
 import numpy as np
 
 from asflown.craft.load import load_craft
-from asflown.estimate.jets import jets
-from asflown.sim.fly import fly
+from asflown.estimate.jets.fit import jets
+from asflown.sim.flight.closed_loop import fly
 
 CLOSEST_S = 180.0
 TRUTH, WIDTH_RAD, PEAK, PEAK_S = np.array([0.55e-12, 10.3e-12, 8.5e-12]), 0.36, 6.48e-12, 39.3  # 004 Table 3

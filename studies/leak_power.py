@@ -9,9 +9,9 @@ import numpy as np
 from scipy.stats import norm
 
 from asflown.craft.load import load_craft
-from asflown.estimate.leak import leak
-from asflown.estimate.leak_filter import threshold_for
-from asflown.sim.fly import fly
+from asflown.estimate.leak.likelihood import threshold_for
+from asflown.estimate.leak.watch import leak
+from asflown.sim.flight.closed_loop import fly
 
 LEAKS_MN = (0.01, 0.02, 0.05, 0.1, 0.3, 1.0, 3.0, 10.0)
 LOSSES = (0.05, 0.1, 0.2, 0.4)

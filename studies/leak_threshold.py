@@ -5,16 +5,17 @@ gains do not depend on data.  The rate an instant is -ln(1 - P)/N, P the share o
 
 Run: python studies/leak_threshold.py.   Answer, 2026-11: ln rate = ln(h)/2 - h within 0.1 for h from 6 to 10,
 from 1 to 16 s a step and 225 to 3600 instants, hence OFFSET and POWER in
-estimate/leak_filter.py.
+estimate/leak/likelihood.py.
 """
 
 import numpy as np
 
 from asflown.craft.load import load_craft
-from asflown.estimate.leak_filter import Monitor
-from asflown.estimate.leak_firing import geometry_of
-from asflown.estimate.leak_known import Known
-from asflown.estimate.leak_samples import Noise, Steps
+from asflown.estimate.leak.firing import geometry_of
+from asflown.estimate.leak.known import Known
+from asflown.estimate.leak.likelihood import Monitor
+from asflown.estimate.leak.noise import Noise
+from asflown.estimate.leak.residual import Steps
 
 RECORDS = 1500
 LEVELS = np.arange(4.0, 11.1, 1.0)

@@ -5,7 +5,7 @@ Run: python studies/momentum_window.py [flights]
 Flies profiles 1 and 2 (triangles of 30 and 15 s) with nominal noise, and once without, and prints
 for each half-width the error without noise at the peaks, and RMS error and largest peak error with noise.
 
-Answer, 2026-11: 18 s, hence HALF_WIDTH_S in estimate/torque_momentum.py: the narrowest with an RMS
+Answer, 2026-11: 18 s, hence HALF_WIDTH_S in estimate/torque/momentum.py: the narrowest with an RMS
 error below the printed method's on both profiles (1.2 and 1.3 mN m against 1.4 and 2.6), and less
 than 15 % lost at a 15-s corner.  The gyro's 2 microrad/s, 10 mN m s of body momentum a sample, forbids
 less.  Unequal windows (12 s for the better wheel rates) gained 1-2 % at the peaks and were given up:
@@ -18,9 +18,11 @@ import sys
 
 import numpy as np
 
-from asflown import disturbance_torque, fly, load_craft
-from asflown.estimate import torque_momentum
-from asflown.estimate.truth import against_truth
+from asflown import disturbance_torque
+from asflown import fly
+from asflown import load_craft
+from asflown.campaigns.truth import against_truth
+from asflown.estimate.torque import momentum as torque_momentum
 
 WIDTHS = (10, 12, 14, 16, 18, 20, 24)
 

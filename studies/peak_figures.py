@@ -24,11 +24,12 @@ from pathlib import Path
 
 import numpy as np
 
-from asflown import load_craft, load_telemetry
-from asflown.estimate.peaks import spread
-from asflown.sim.fly_mission import fly_mission
-from asflown.trends.analyse import torque_about_hinge
-from asflown.trends.events import load_events
+from asflown import load_craft
+from asflown import load_telemetry
+from asflown.kit.ensemble import spread
+from asflown.sim.mission.flown import fly_mission
+from asflown.trends.entries.actuation import torque_about_hinge
+from asflown.trends.entries.events import load_events
 
 
 def main(seed: int) -> None:

@@ -20,12 +20,18 @@ import numpy as np
 
 from asflown.craft.load import load_craft
 from asflown.dynamics.flyby import flyby_called
-from asflown.dynamics.plume import plume_density, published_jets
-from asflown.estimate.density import density
-from asflown.estimate.latent import ATTITUDE_ERROR, BODY_RATE, MOMENTUM, channel_of, step_of
-from asflown.estimate.whitened import AxisData, regression
+from asflown.dynamics.plume import plume_density
+from asflown.dynamics.plume import published_jets
+from asflown.estimate.density.along_flyby import density
+from asflown.estimate.fused.series import ATTITUDE_ERROR
+from asflown.estimate.fused.series import BODY_RATE
+from asflown.estimate.fused.series import MOMENTUM
+from asflown.estimate.fused.series import channel_of
+from asflown.estimate.fused.series import step_of
+from asflown.estimate.fused.whitening import AxisData
+from asflown.estimate.fused.whitening import regression
 from asflown.kit.smoother import Measurements
-from asflown.sim.fly import fly
+from asflown.sim.flight.closed_loop import fly
 
 CLOSEST_S, PER_DENSITY, E3 = 180.0, -3.4222e9, flyby_called("E3")
 TRUE_S, OTHER_S, OWN_S = 34.0, 45.0, 33.1

@@ -55,9 +55,11 @@ from dataclasses import replace
 import numpy as np
 from scipy import signal
 
-from asflown import disturbance_torque, fly, load_craft
-from asflown.estimate.peaks import PEAK_REACH_S
-from asflown.sim.scenario import load_scenario
+from asflown import disturbance_torque
+from asflown import fly
+from asflown import load_craft
+from asflown.estimate.fused.peaks import PEAK_REACH_S
+from asflown.sim.scenario.scenario import load_scenario
 
 CRAFT = load_craft("cassini")
 _PEAK_NM, _PERIOD_S, _COUNT = 0.0198, 45.0, 5

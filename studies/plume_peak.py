@@ -16,9 +16,9 @@ import sys
 import numpy as np
 
 from asflown.craft.load import load_craft
-from asflown.estimate.density import density
-from asflown.estimate.jets import jets
-from asflown.sim.fly import fly
+from asflown.estimate.density.along_flyby import density
+from asflown.estimate.jets.fit import jets
+from asflown.sim.flight.closed_loop import fly
 
 CLOSEST_S, TRUE_SCALE = 180.0, 3.4222e9
 #: Records for jets end where the simulator's fade; those for polynomials as 004's. [s]

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from asflown.sim import mission, scenario
+from asflown.sim import scenario
+from asflown.sim.mission import mission
 from asflown.telemetry import dictionary
 from asflown.telemetry.channels import KINDS
 
@@ -120,7 +121,7 @@ def test_simulator_page_lists_the_shipped_scenarios_and_its_example_flies(tmp_pa
 
 
 def test_simulator_page_gives_the_noise_table():
-    from asflown.sim.sensors import NOISE
+    from asflown.sim.flight.sensors import NOISE
 
     rows = [[c.strip() for c in x.split("|")[2:-1]] for x in section(page("simulator.md"), "Noise").splitlines()
             if x.startswith("| ")][1:]  # fmt: skip
@@ -131,7 +132,7 @@ def test_simulator_page_gives_the_noise_table():
 
 
 def test_store_page_lists_every_table_and_column():
-    from asflown.trends.schema import METADATA
+    from asflown.trends.store.schema import METADATA
 
     rows = [x.split(" | ") for x in section(page("store.md"), "What is kept").splitlines() if x.startswith("| `")]
     listed = {name.strip("| `"): set(re.findall(r"`(\w+)`", columns)) for name, _, columns in rows}

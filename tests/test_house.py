@@ -1,6 +1,7 @@
 """The house itself: which room may know which, and what a cold start may cost."""
 
 import ast
+import graphlib
 import subprocess
 import sys
 from pathlib import Path
@@ -38,6 +39,50 @@ MAY_IMPORT = {
     },
 }
 
+#: Within ``estimate``, sub-package -> sub-packages whose face it may import.
+MAY_IMPORT_IN_ESTIMATE = {
+    "subject": set(),
+    "wheels": set(),
+    "gates": set(),
+    "fused": {"subject"},
+    "firing": {"subject"},
+    "inertia": {"subject"},
+    "external": {"subject"},
+    "torque": {"fused", "firing", "subject"},
+    "thrust": {"firing", "subject"},
+    "leak": {"firing", "subject"},
+    "density": {"torque", "fused", "firing", "subject"},
+    "jets": {"density", "fused", "subject"},
+}
+
+#: Packages that others enter by their face, the names in their ``__init__.py``.
+FACES = [f"estimate.{name}" for name in MAY_IMPORT_IN_ESTIMATE] + [
+    *(f"sim.{name}" for name in ("scenario", "flight", "mission")),
+    *(f"trends.{name}" for name in ("store", "statistics", "entries")),
+]
+
+
+def imported(path: Path):
+    """(module, name) for everything that a file of asflown imports from asflown; the module as a tuple of its parts."""
+    parts = path.relative_to(SRC).parts[:-1]
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom):
+            tail = tuple(node.module.split(".")) if node.module else ()
+            if node.level:
+                module = parts[: len(parts) - node.level + 1] + tail
+            elif tail[0] == "asflown":
+                module = tail[1:]
+            else:
+                continue
+            for a in node.names:
+                yield module, a.name
+
+
+def module_name(path: Path) -> tuple[str, ...]:
+    """Parts of a module's dotted name below asflown; a package is named without its __init__."""
+    parts = path.relative_to(SRC).with_suffix("").parts
+    return parts[:-1] if parts[-1] == "__init__" else parts
+
 
 def imports_of(room: str) -> set[str]:
     """Rooms that any module of ``room`` imports, at its top or inside a function."""
@@ -66,12 +111,64 @@ def test_imports_follow_the_data(room):
 
 
 def test_sim_takes_no_more_of_dynamics_than_the_world_flown_through():
-    taken = set()
-    for path in (SRC / "sim").glob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.ImportFrom) and node.level == 2 and (node.module or "").startswith("dynamics"):
-                taken.add(node.module.removeprefix("dynamics."))
+    taken = {m[1] for p in (SRC / "sim").rglob("*.py") for m, _ in imported(p) if m[:1] == ("dynamics",)}
     assert taken == {"flyby", "plume", "drag"}
+
+
+def test_every_room_of_estimate_is_known():
+    estimate = SRC / "estimate"
+    assert {p.name for p in estimate.iterdir() if p.is_dir() and p.name != "__pycache__"} == set(MAY_IMPORT_IN_ESTIMATE)
+    assert [p.name for p in estimate.glob("*.py")] == ["__init__.py"]
+
+
+@pytest.mark.parametrize("room", MAY_IMPORT_IN_ESTIMATE)
+def test_imports_within_estimate_follow_the_arrows(room):
+    taken = {m[1] for p in (SRC / "estimate" / room).rglob("*.py") for m, _ in imported(p) if m[:1] == ("estimate",)}
+    assert taken - {room} <= MAY_IMPORT_IN_ESTIMATE[room]
+
+
+@pytest.mark.parametrize("face", FACES)
+def test_others_enter_by_the_face(face):
+    parts = tuple(face.split("."))
+    public = ast.literal_eval(
+        next(
+            n.value
+            for n in ast.parse((SRC.joinpath(*parts) / "__init__.py").read_text()).body
+            if isinstance(n, ast.Assign) and n.targets[0].id == "__all__"
+        )
+    )
+    wrong = [
+        (str(path.relative_to(SRC)), ".".join(module), name)
+        for path in SRC.rglob("*.py")
+        if module_name(path)[: len(parts)] != parts
+        for module, name in imported(path)
+        if module[: len(parts)] == parts and (module != parts or name not in public)
+    ]
+    assert not wrong
+
+
+@pytest.mark.parametrize("face", FACES)
+def test_a_face_is_short_and_computes_nothing(face):
+    path = SRC.joinpath(*face.split(".")) / "__init__.py"
+    text = path.read_text()
+    assert len(text.splitlines()) < 40
+    body = ast.parse(text).body
+    assert ast.get_docstring(ast.parse(text))
+    assert all(isinstance(n, ast.ImportFrom) for n in body[1:-1]) and isinstance(body[-1], ast.Assign)
+    public = set(ast.literal_eval(body[-1].value))
+    modules = {p.stem for p in path.parent.glob("*.py")}
+    assert not public & modules, "a module bears the name of what its face shows"
+
+
+def test_no_module_circle():
+    """All import statements count: at the top, inside functions, and those that only type checkers run."""
+    files = {module_name(p): p for p in SRC.rglob("*.py")}
+    edges = {
+        name: {(*m, n) if (*m, n) in files else m for m, n in imported(path)} & set(files) - {name}
+        for name, path in files.items()
+        if name  # the package itself names all that is public
+    }
+    graphlib.TopologicalSorter(edges).prepare()  # raises CycleError, which names the circle
 
 
 def test_help_loads_nothing_heavy():

@@ -17,42 +17,42 @@ _PUBLIC = {
     "load_telemetry": "asflown.telemetry.load",
     "write_table": "asflown.telemetry.tables",
     "disturbance_torque": "asflown.estimate.torque",
-    "TorqueResult": "asflown.estimate.result",
-    "compare_torques": "asflown.estimate.compare",
-    "external_torque": "asflown.estimate.external_torque",
-    "ExternalTorque": "asflown.estimate.external_result",
+    "TorqueResult": "asflown.estimate.torque",
+    "compare_torques": "asflown.estimate.torque",
+    "external_torque": "asflown.estimate.external",
+    "ExternalTorque": "asflown.estimate.external",
     "density": "asflown.estimate.density",
-    "DensityResult": "asflown.estimate.density_result",
+    "DensityResult": "asflown.estimate.density",
     "jets": "asflown.estimate.jets",
-    "JetsResult": "asflown.estimate.jets_result",
+    "JetsResult": "asflown.estimate.jets",
     "leak": "asflown.estimate.leak",
     "LeakWatch": "asflown.estimate.leak",
-    "LeakResult": "asflown.estimate.leak_result",
+    "LeakResult": "asflown.estimate.leak",
     "thrust": "asflown.estimate.thrust",
-    "ThrustResult": "asflown.estimate.thrust_result",
-    "wheel_drag": "asflown.estimate.wheel_drag",
-    "WheelsResult": "asflown.estimate.wheel_result",
+    "ThrustResult": "asflown.estimate.thrust",
+    "wheel_drag": "asflown.estimate.wheels",
+    "WheelsResult": "asflown.estimate.wheels",
     "inertia_tensor": "asflown.estimate.inertia",
-    "InertiaResult": "asflown.estimate.inertia_result",
+    "InertiaResult": "asflown.estimate.inertia",
     "Scenario": "asflown.sim.scenario",
     "load_scenario": "asflown.sim.scenario",
-    "fly": "asflown.sim.fly",
-    "write_flight": "asflown.sim.fly",
-    "figure_of_merit": "asflown.trends.figures",
+    "fly": "asflown.sim.flight",
+    "write_flight": "asflown.sim.flight",
+    "figure_of_merit": "asflown.trends.entries",
     "TrendStore": "asflown.trends.store",
     "Mission": "asflown.sim.mission",
     "load_mission": "asflown.sim.mission",
-    "fly_mission": "asflown.sim.fly_mission",
+    "fly_mission": "asflown.sim.mission",
     "error_budget": "asflown.campaigns.budget",
     "Gates": "asflown.maneuvers.model",
     "Maneuvers": "asflown.maneuvers.table",
     "load_maneuvers": "asflown.maneuvers.table",
     "write_maneuvers": "asflown.maneuvers.write",
     "past_model": "asflown.maneuvers.history",
-    "fit_gates": "asflown.estimate.gates_fit",
-    "GatesFit": "asflown.estimate.gates_result",
-    "judge_gates": "asflown.estimate.gates_judge",
-    "watch_maneuvers": "asflown.estimate.gates_watch",
+    "fit_gates": "asflown.estimate.gates",
+    "GatesFit": "asflown.estimate.gates",
+    "judge_gates": "asflown.estimate.gates",
+    "watch_maneuvers": "asflown.estimate.gates",
 }
 
 __all__ = [*_PUBLIC, "__version__"]
@@ -72,38 +72,25 @@ if TYPE_CHECKING:
     from asflown.campaigns.budget import error_budget
     from asflown.craft.load import built_in_crafts, load_craft
     from asflown.craft.model import Craft
-    from asflown.estimate.compare import compare_torques
-    from asflown.estimate.density import density
-    from asflown.estimate.density_result import DensityResult
-    from asflown.estimate.external_result import ExternalTorque
-    from asflown.estimate.external_torque import external_torque
-    from asflown.estimate.gates_fit import fit_gates
-    from asflown.estimate.gates_judge import judge_gates
-    from asflown.estimate.gates_result import GatesFit
-    from asflown.estimate.gates_watch import watch_maneuvers
-    from asflown.estimate.inertia import inertia_tensor
-    from asflown.estimate.inertia_result import InertiaResult
-    from asflown.estimate.jets import jets
-    from asflown.estimate.jets_result import JetsResult
-    from asflown.estimate.leak import LeakWatch, leak
-    from asflown.estimate.leak_result import LeakResult
-    from asflown.estimate.result import TorqueResult
-    from asflown.estimate.thrust import thrust
-    from asflown.estimate.thrust_result import ThrustResult
-    from asflown.estimate.torque import disturbance_torque
-    from asflown.estimate.wheel_drag import wheel_drag
-    from asflown.estimate.wheel_result import WheelsResult
+    from asflown.estimate.density import DensityResult, density
+    from asflown.estimate.external import ExternalTorque, external_torque
+    from asflown.estimate.gates import GatesFit, fit_gates, judge_gates, watch_maneuvers
+    from asflown.estimate.inertia import InertiaResult, inertia_tensor
+    from asflown.estimate.jets import JetsResult, jets
+    from asflown.estimate.leak import LeakResult, LeakWatch, leak
+    from asflown.estimate.thrust import ThrustResult, thrust
+    from asflown.estimate.torque import TorqueResult, compare_torques, disturbance_torque
+    from asflown.estimate.wheels import WheelsResult, wheel_drag
     from asflown.kit.errors import BadInput
     from asflown.maneuvers.history import past_model
     from asflown.maneuvers.model import Gates
     from asflown.maneuvers.table import Maneuvers, load_maneuvers
     from asflown.maneuvers.write import write_maneuvers
-    from asflown.sim.fly import fly, write_flight
-    from asflown.sim.fly_mission import fly_mission
-    from asflown.sim.mission import Mission, load_mission
+    from asflown.sim.flight import fly, write_flight
+    from asflown.sim.mission import Mission, fly_mission, load_mission
     from asflown.sim.scenario import Scenario, load_scenario
     from asflown.telemetry.load import load_telemetry
     from asflown.telemetry.tables import write_table
     from asflown.telemetry.telemetry import Telemetry
-    from asflown.trends.figures import figure_of_merit
+    from asflown.trends.entries import figure_of_merit
     from asflown.trends.store import TrendStore

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from asflown.kit.rotations import rotation
-from asflown.sim.fly import fly
+from asflown.sim.flight.closed_loop import fly
 from asflown.telemetry.tables import write_table
 from cli.program import complaint, csv_text, flight, run
 

@@ -287,7 +287,7 @@ def test_a_dead_sensor_is_told(tmp_path):
 
 def test_recovery_a_slew_without_a_torque_shows_none_and_accuses_no_sign(tmp_path):
     """Wheels and body trade 15 N m s in a slew; smoothed unlike each other they left 25 mN m at its corners."""
-    from asflown.sim.fly import fly
+    from asflown.sim.flight.closed_loop import fly
 
     write_table(fly("slews", duration="420 s", seed=3).telemetry, tmp_path / "slew.csv")
     record = torque(tmp_path / "slew.csv")

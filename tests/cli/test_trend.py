@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from asflown.trends.store import TrendStore
+from asflown.trends.store.store import TrendStore
 from trends.histories import history
 
 from .program import run

@@ -13,7 +13,7 @@ from asflown.dynamics.loop import (
     hankel_singular_values,
     low_order,
     wheel_momentum_rate_per_torque,
-)  # fmt: skip
+)
 
 K = load_craft("cassini").wheel_controller
 

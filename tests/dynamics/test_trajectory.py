@@ -12,7 +12,7 @@ from asflown.dynamics.plume import as_passed, plume_density, published_jets, see
 from asflown.dynamics.trajectory import Trajectory
 from asflown.kit.errors import BadInput
 from asflown.kit.timeline import et_to_tai_ns, utc_to_tai_ns
-from asflown.sim.fly import fly
+from asflown.sim.flight.closed_loop import fly
 from asflown.telemetry.kernels import trajectory_from_kernels
 from asflown.telemetry.tables import write_table
 from asflown.telemetry.trajectory import load_trajectory

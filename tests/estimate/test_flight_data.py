@@ -8,14 +8,14 @@ import pytest
 
 from asflown.craft.load import load_craft
 from asflown.dynamics.momentum import wheel_momentum
-from asflown.estimate.held_back import APART, blocks, hold_back
-from asflown.estimate.latent import BODY_RATE, MOMENTUM
-from asflown.estimate.latent_free import FreeBody
-from asflown.estimate.levels import OUTLYING
-from asflown.estimate.records import gather
-from asflown.estimate.result import save_csv
-from asflown.estimate.subject import subject_of
-from asflown.estimate.torque import disturbance_torque
+from asflown.estimate.fused.free_body import FreeBody
+from asflown.estimate.fused.gather import gather
+from asflown.estimate.fused.held_back import APART, blocks, hold_back
+from asflown.estimate.fused.levels import OUTLYING
+from asflown.estimate.fused.series import BODY_RATE, MOMENTUM
+from asflown.estimate.subject.subject import subject_of
+from asflown.estimate.torque.reconstruct import disturbance_torque
+from asflown.estimate.torque.table import save_csv
 from asflown.telemetry.load import load_telemetry
 from asflown.telemetry.screening import gaps
 from conftest import ROOT, flight_data

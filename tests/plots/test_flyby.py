@@ -7,11 +7,11 @@ import pytest
 
 from asflown.craft.load import load_craft
 from asflown.dynamics.flyby import flyby_called
-from asflown.estimate.density import density
-from asflown.estimate.jets import jets
+from asflown.estimate.density.along_flyby import density
+from asflown.estimate.jets.fit import jets
 from asflown.plots.figure import new_figure, save_figures
 from asflown.plots.flyby import draw_from_pole, draw_geometry, flyby_figures
-from asflown.sim.fly import fly
+from asflown.sim.flight.closed_loop import fly
 from cli.program import complaint, run
 
 CASSINI = load_craft("cassini")

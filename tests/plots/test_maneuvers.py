@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asflown.estimate.gates_fit import fit_gates
-from asflown.estimate.gates_judge import judge_gates
-from asflown.estimate.gates_watch import watch_maneuvers
+from asflown.estimate.gates.fit import fit_gates
+from asflown.estimate.gates.judge import judge_gates
+from asflown.estimate.gates.watch import watch_maneuvers
 from asflown.maneuvers.history import past_model
 from asflown.plots.figure import new_figure, save_figures
 from asflown.plots.labels import label_points

@@ -5,8 +5,8 @@ import re
 
 import pytest
 
-from asflown.estimate.gates_fit import fit_gates
-from asflown.estimate.gates_judge import judge_gates
+from asflown.estimate.gates.fit import fit_gates
+from asflown.estimate.gates.judge import judge_gates
 from asflown.maneuvers.history import past_model
 from asflown.report.gates_page import write_gates_report
 from asflown.sim.maneuver_sets import RCS_SET, a_branch, execute

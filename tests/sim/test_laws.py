@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from asflown.sim.fly import fly
+from asflown.sim.flight.closed_loop import fly
 
 EVERYTHING = {
     "flexible": True,
@@ -80,7 +80,7 @@ MOTORS = np.array([0.01, 0.0, -0.02])
 
 def small_body():
     """A body, three wheels and one mode that carries a sixth of the inertia: everything matters."""
-    from asflown.sim.plant import Plant
+    from asflown.sim.flight.plant import Plant
 
     empty = np.empty(0)
     return Plant(
@@ -92,7 +92,7 @@ def small_body():
 
 def test_law_runge_kutta_is_of_fourth_order():
     """Without the control cycle: the integrator alone, tumbling."""
-    from asflown.sim.plant import advance
+    from asflown.sim.flight.plant import advance
 
     plant, ends = small_body(), []
     for steps in (80, 160, 320, 2560):
@@ -105,7 +105,7 @@ def test_law_runge_kutta_is_of_fourth_order():
 
 
 def test_law_energy_balances_with_a_heavy_mode():
-    from asflown.sim.plant import advance
+    from asflown.sim.flight.plant import advance
 
     plant, x = small_body(), TUMBLING.copy()
 
@@ -137,7 +137,7 @@ def test_law_same_seed_same_numbers_other_seed_other_numbers():
 
 SHORT = """
 import numpy as np
-from asflown.sim.fly import fly
+from asflown.sim.flight import fly
 f = fly("cover-deploy", duration="6 s", settle="0 s", flexible=True, friction=True, noise="nominal",
         cover={"times": "1 3 5 s", "rates": "0 73.225 0 deg/s", "motor_on": "1 s", "stall": "5 s"})
 np.save("OUT", np.hstack([f.truth.body_rate_rad_s, f.truth.wheel_rate_rad_s, f.truth.attitude]))
@@ -146,7 +146,7 @@ np.save("OUT", np.hstack([f.truth.body_rate_rad_s, f.truth.wheel_rate_rad_s, f.t
 
 WITH_THRUSTERS = """
 import numpy as np
-from asflown.sim.fly import fly
+from asflown.sim.flight import fly
 bias = [{"start": "0 s", "stop": "2 s", "rates": {"RWA1": "30 rpm", "RWA4": "30 rpm"}}]
 f = fly("wheel-bias-fsds", duration="6 s", wheel_biases=bias, thrusters={"deadband": "30 30 30 urad", "catalyst_beds": {}})
 assert f.truth.thrusters.pulses[-1].sum() > 3

@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import expm
 
 from asflown.craft.load import load_craft
-from asflown.sim.fly import fly
+from asflown.sim.flight.closed_loop import fly
 
 WN, ZN = 2 * np.pi * 0.0299, 0.4138
 KP, KD = WN / (2 * ZN), 2 * ZN * WN

@@ -11,15 +11,15 @@ import pytest
 
 from asflown.craft.load import load_craft
 from asflown.kit.errors import BadInput
-from asflown.sim import mission
-from asflown.sim.cover import momentum_per_rate, moving_part
-from asflown.sim.fly import fly
-from asflown.sim.fly_mission import fly_mission, line_at, plan_mission
-from asflown.sim.mission import is_mission, load_mission, shipped_missions
-from asflown.sim.scenario import load_scenario
-from asflown.trends.events import load_events
+from asflown.sim.flight.closed_loop import fly
+from asflown.sim.flight.cover import momentum_per_rate, moving_part
+from asflown.sim.mission import mission
+from asflown.sim.mission.flown import fly_mission, line_at, plan_mission
+from asflown.sim.mission.mission import is_mission, load_mission, shipped_missions
+from asflown.sim.scenario.scenario import load_scenario
+from asflown.trends.entries.events import load_events
 
-SHIPPED = Path(mission.__file__).parent / "missions" / "cassini-mission.toml"
+SHIPPED = Path(mission.__file__).parents[1] / "missions" / "cassini-mission.toml"
 
 #: 000 Tables 1, 2 and B1: (kind, date) -> printed days since the last chronological actuation.
 PRINTED = {
@@ -143,7 +143,7 @@ def test_law_true_figures_are_the_wanted_ones(written):
 
 def test_law_the_true_line_is_the_declared_one_without_scatter(mission, cassini):
     """Every motion's own torque, not what was wanted of it: +30 % and -33 %, straight."""
-    from asflown.sim.ageing import true_figures
+    from asflown.sim.mission.ageing import true_figures
 
     plan = [p for p in plan_mission(mission.changed(scatter=EXACT), cassini) if p.event.kind == "deploy"]
     true = np.array([three(true_figures(p.scenario.cover, cassini.at(p.event.tai_ns))) for p in plan])
@@ -164,8 +164,8 @@ def test_law_all_is_internal_and_the_travel_is_whole(planned):
 
 
 def test_law_momentum_per_rate_is_the_plants(cassini):
-    from asflown.sim.fly import _plant
-    from asflown.sim.plant import moving_part_history, moving_part_motion
+    from asflown.sim.flight.closed_loop import _plant
+    from asflown.sim.flight.plant import moving_part_history, moving_part_motion
 
     scenario = load_scenario("cover-stow")
     now = cassini.at(scenario.epoch_ns)

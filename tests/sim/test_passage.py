@@ -8,9 +8,9 @@ import pytest
 from asflown.craft.load import load_craft
 from asflown.dynamics.environment import gravity_gradient, gravity_gradient_bound
 from asflown.kit.errors import BadInput
-from asflown.sim.fly import fly
-from asflown.sim.passage import passed
-from asflown.sim.scenario import load_scenario
+from asflown.sim.flight.closed_loop import fly
+from asflown.sim.flight.passage import passed
+from asflown.sim.scenario.scenario import load_scenario
 from cli.program import complaint, run
 
 CASSINI = load_craft("cassini")

@@ -7,9 +7,9 @@ import pytest
 from typer.testing import CliRunner
 
 from asflown.kit.errors import BadInput
-from asflown.sim.command import commanded_motion, slew_time
-from asflown.sim.fly import fly, write_flight
-from asflown.sim.scenario import load_scenario, shipped_scenarios
+from asflown.sim.flight.closed_loop import fly, write_flight
+from asflown.sim.flight.command import commanded_motion, slew_time
+from asflown.sim.scenario.scenario import load_scenario, shipped_scenarios
 
 
 def test_shipped_scenarios_are_those_promised():

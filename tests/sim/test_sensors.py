@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from asflown.kit.errors import BadInput
-from asflown.sim.fly import fly
-from asflown.sim.sensors import NOISE, stream
+from asflown.sim.flight.closed_loop import fly
+from asflown.sim.flight.sensors import NOISE, stream
 
 
 def test_published_noise_table():

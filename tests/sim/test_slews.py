@@ -8,9 +8,9 @@ from asflown.craft.load import load_craft
 from asflown.craft.model import Pendulum
 from asflown.kit.errors import BadInput
 from asflown.kit.rotations import rotation
-from asflown.sim.fly import fly
-from asflown.sim.modes import pendulum_coupling
-from asflown.sim.plant import Plant, advance
+from asflown.sim.flight.closed_loop import fly
+from asflown.sim.flight.modes import pendulum_coupling
+from asflown.sim.flight.plant import Plant, advance
 
 
 @pytest.mark.parametrize("name", ["slews-axes", "slews-multi"])

@@ -9,9 +9,9 @@ import pytest
 from asflown.craft.load import load_craft
 from asflown.kit.errors import BadInput
 from asflown.kit.rotations import rotation
-from asflown.sim.fly import fly, write_flight
-from asflown.sim.plant import impulses
-from asflown.sim.thrusters import thrusters_of
+from asflown.sim.flight.closed_loop import fly, write_flight
+from asflown.sim.flight.plant import impulses
+from asflown.sim.flight.thrusters import thrusters_of
 
 DELAY, RISE, FALL = 0.005, 0.020, 0.065
 WHEELS = ("RWA1", "RWA2", "RWA4")
@@ -28,7 +28,7 @@ def pulse_ratio(on_time: float, fall: float = FALL) -> float:
 
 def flown_ratio(cycles: int, substeps: int = 4, **changes) -> float:
     """The same from the plant's kernel."""
-    from asflown.sim.scenario import load_scenario
+    from asflown.sim.scenario.scenario import load_scenario
 
     scenario = load_scenario("wheel-bias-fsds").changed(**changes)
     now = load_craft(scenario.craft).at(scenario.epoch_ns)

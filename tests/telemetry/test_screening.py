@@ -7,15 +7,7 @@ import pytest
 
 from asflown.craft.load import load_craft
 from asflown.kit.errors import BadInput
-from asflown.telemetry.screening import (
-    dropouts,
-    gaps,
-    needs_a_look,
-    noise_sigma,
-    quantisation_step,
-    screen,
-    summaries,
-)
+from asflown.telemetry.screening import dropouts, gaps, needs_a_look, noise_sigma, quantisation_step, screen, summaries
 from telemetry.flights import EPOCH, noise, telemetry_of
 
 T = np.arange(0.0, 1000.0, 2.0)

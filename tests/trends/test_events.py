@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from asflown import fly
 from asflown.kit.errors import BadInput
-from asflown.trends.events import find_events, is_event_list, load_events, stall
+from asflown.trends.entries.events import find_events, is_event_list, load_events, stall
 
 TOML = """
 [[event]]

@@ -5,9 +5,9 @@ import pytest
 
 from asflown import fly, load_craft
 from asflown.kit.errors import BadInput
-from asflown.trends.analyse import analyse
-from asflown.trends.events import Event
-from asflown.trends.figures import FIGURES, Torque, figure_of_merit, load_figures, measure
+from asflown.trends.entries.actuation import analyse
+from asflown.trends.entries.events import Event
+from asflown.trends.entries.figures import FIGURES, Torque, figure_of_merit, load_figures, measure
 
 TIME = np.arange(-60.0, 361.0)
 EVENT = Event("e", "deploy", "2015-09-29T00:00:00", None, 60.0, 420.0)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from asflown.craft.load import load_craft
-from asflown.estimate.gates_fit import fit_gates
+from asflown.estimate.gates.fit import fit_gates
 from asflown.kit.errors import BadInput
 from asflown.kit.timeline import utc_to_tai_ns
 from asflown.maneuvers.history import past_model
 from asflown.sim.maneuver_sets import RCS_SET, execute
-from asflown.trends.gates_entry import gates_entry
-from asflown.trends.store import TrendStore
+from asflown.trends.entries.gates import gates_entry
+from asflown.trends.store.store import TrendStore
 from asflown.trends.verdicts import judge
 from cli.program import complaint, run
 

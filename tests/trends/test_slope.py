@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from asflown.trends.change import step_of
-from asflown.trends.newest import newest_of
-from asflown.trends.slope import Values, holm, power_of_slope, trend_of
+from asflown.trends.statistics.change import step_of
+from asflown.trends.statistics.newest import newest_of
+from asflown.trends.statistics.slope import Values, holm, power_of_slope, trend_of
 
 from .histories import DEPLOYS
 

@@ -26,10 +26,10 @@ from sqlalchemy.engine import make_url
 from sqlalchemy.exc import DBAPIError
 
 from asflown.kit.errors import BadInput
-from asflown.trends import place
 from asflown.trends.entry import Curve, Entry, Value
-from asflown.trends.schema import HEAD, METADATA, VERSION_TABLE
-from asflown.trends.store import TrendStore
+from asflown.trends.store import place
+from asflown.trends.store.schema import HEAD, METADATA, VERSION_TABLE
+from asflown.trends.store.store import TrendStore
 from trends.writer import CURVES, VALUES, entry
 
 SERVER = os.environ.get("ASFLOWN_TEST_POSTGRESQL")
@@ -396,7 +396,7 @@ def test_law_migrations_from_empty_make_what_the_code_declares(url):
         assert compare_metadata(MigrationContext.configure(c, opts=options), METADATA) == []
         assert c.scalar(text(f"SELECT version_num FROM {VERSION_TABLE}")) == HEAD
     config = Config()
-    config.set_main_option("script_location", "asflown.trends:migrations")
+    config.set_main_option("script_location", "asflown.trends.store:migrations")
     assert ScriptDirectory.from_config(config).get_heads() == [HEAD]
 
 

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from asflown.craft.load import load_craft
-from asflown.estimate.thrust import thrust
-from asflown.estimate.thrust_priors import priors_for
-from asflown.estimate.thrust_result import ThrustResult
+from asflown.estimate.firing.priors import priors_for
+from asflown.estimate.thrust.methods import thrust
+from asflown.estimate.thrust.result import ThrustResult
 from asflown.kit.errors import BadInput
 from asflown.kit.timeline import utc_to_tai_ns
-from asflown.sim.fly import fly
+from asflown.sim.flight.closed_loop import fly
 from asflown.telemetry.channels import kind_of
 from asflown.telemetry.telemetry import Channel, Telemetry
-from asflown.trends.thrust_entry import thrust_entry
+from asflown.trends.entries.thrust import thrust_entry
 from asflown.trends.verdicts import judge
 from cli.program import run
 
@@ -85,7 +85,7 @@ def test_other_methods_are_kept_apart_and_a_record_needs_a_date(tmp_path):
 
 
 def test_program_watches_thrust(tmp_path):
-    from asflown.trends.store import TrendStore
+    from asflown.trends.store.store import TrendStore
 
     store = tmp_path / "s.db"
     with TrendStore.open(store) as trends:

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from asflown.kit.errors import BadInput
-from asflown.trends.curves import distance, registered, shape_of
 from asflown.trends.entry import Curve, Entry, Value
-from asflown.trends.pairs import cycles, equivalence, find_pairs, rests, whole_days
-from asflown.trends.slope import trend_of
+from asflown.trends.statistics.curves import distance, registered, shape_of
+from asflown.trends.statistics.pairs import cycles, equivalence, find_pairs, rests, whole_days
+from asflown.trends.statistics.slope import trend_of
 from asflown.trends.verdicts import judge, values_of
 
 from .histories import history, torque

@@ -6,9 +6,9 @@ from itertools import count
 
 import numpy as np
 
-from asflown.trends import store as under_test
 from asflown.trends.entry import Curve, Entry, Value
-from asflown.trends.store import TrendStore
+from asflown.trends.store import store as under_test
+from asflown.trends.store.store import TrendStore
 
 VALUES, CURVES = 20, 4
 

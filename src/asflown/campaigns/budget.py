@@ -14,13 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..craft.model import Craft
-from ..estimate.peaks import PEAK_REACH_S
-from ..estimate.result import AXES, TorqueResult
-from ..estimate.torque import METHODS, VARIANTS, disturbance_torque
-from ..estimate.truth import against_truth
+from ..estimate.fused import PEAK_REACH_S
+from ..estimate.torque import METHODS, VARIANTS, TorqueResult, disturbance_torque
 from ..kit.errors import BadInput, some_of
-from ..sim.fly import fly
+from ..sim.flight import fly
 from ..sim.scenario import Scenario, load_scenario
+from ..telemetry.channels import AXES
+from .truth import against_truth
 
 #: A method by name: its own, corrected, or with "-printed".
 DEFAULT_METHODS = ("momentum-printed", "transfer-printed", "momentum", "transfer", "fused")

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..craft.model import Craft
-from ..estimate.subject import Subject, subject_of
-from ..estimate.torque_momentum import smoothed_as_printed, splined, splined_momentum
+from ..estimate.subject import Subject, splined, subject_of
+from ..estimate.torque import smoothed_as_printed, splined_momentum
 from ..kit.errors import BadInput
-from ..sim.fly import Flight, fly
+from ..sim.flight import Flight, fly
 from ..sim.scenario import Scenario
 from ..telemetry.channels import AXES
 from .budget import of_rise

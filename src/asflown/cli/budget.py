@@ -32,8 +32,8 @@ def budget(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from asflown.campaigns.budget import DEFAULT_METHODS, error_budget, of_rise, split_method
-    from asflown.sim.scenario import load_scenario
+    from ..campaigns.budget import DEFAULT_METHODS, error_budget, of_rise, split_method
+    from ..sim.scenario import load_scenario
 
     ship = craft_from(craft, inertia, cm)
     names = [m.strip() for m in methods.split(",")] if methods else list(DEFAULT_METHODS)

@@ -13,7 +13,7 @@ app = typer.Typer(help=__doc__, rich_markup_mode=None)
 @app.command("list")
 def list_(json: bool = JSON) -> None:
     """The built-in crafts."""
-    from asflown.craft.load import built_in_crafts, load_craft
+    from ..craft.load import built_in_crafts, load_craft
 
     crafts = [load_craft(n) for n in built_in_crafts()]
     if json:
@@ -36,8 +36,8 @@ def show(
     json: bool = JSON,
 ) -> None:
     """A craft as it was on a date."""
-    from asflown.craft.load import load_craft
-    from asflown.kit.timeline import utc_to_tai_ns
+    from ..craft.load import load_craft
+    from ..kit.timeline import utc_to_tai_ns
 
     c = load_craft(name)
     now = c.at(utc_to_tai_ns(at) if at is not None else None)
@@ -84,7 +84,7 @@ def _by_timing(thrusters) -> dict[str, list[str]]:
 @app.command(short_help="Say what is wrong with a craft file, or that nothing is.")
 def check(file: str = typer.Argument(help="A craft TOML file."), json: bool = JSON) -> None:
     """Read a craft file and say what is wrong with it, or that nothing is."""
-    from asflown.craft.load import load_craft
+    from ..craft.load import load_craft
 
     c = load_craft(file)
     now = c.at(None)

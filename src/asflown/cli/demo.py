@@ -25,7 +25,7 @@ def demo(
     json: bool = JSON,
 ) -> None:
     """Fly the papers' test torques and a cover deployment, reconstruct them, and say how wrong each method is."""
-    from asflown.kit.files import check_folder
+    from ..kit.files import check_folder
 
     check_folder(out)
     from rich.console import Console
@@ -59,8 +59,8 @@ def demo(
 
 def _fly(name: str, out: Path, noise: str):
     """Fly, write, and read back through the door that real telemetry comes through."""
-    from asflown.sim.fly import fly, write_flight
-    from asflown.telemetry.load import load_telemetry
+    from ..sim.flight import fly, write_flight
+    from ..telemetry.load import load_telemetry
 
     flight = fly(name, noise=noise, seed=SEED)
     folder = out / (name if noise == "nominal" else f"{name}-{noise}-noise")
@@ -69,11 +69,11 @@ def _fly(name: str, out: Path, noise: str):
 
 
 def _profile(name: str, out: Path, step) -> dict:
-    from asflown.craft.load import load_craft
-    from asflown.estimate.torque import disturbance_torque
-    from asflown.estimate.truth import PUBLISHED_PEAK_ERRORS, against_truth
-    from asflown.plots.actuation import torque_figure
-    from asflown.plots.figure import save
+    from ..campaigns.truth import PUBLISHED_PEAK_ERRORS, against_truth
+    from ..craft.load import load_craft
+    from ..estimate.torque import disturbance_torque
+    from ..plots.actuation import torque_figure
+    from ..plots.figure import save
 
     craft = load_craft("cassini")
     label, number = PROFILES[name]
@@ -98,13 +98,12 @@ def _profile(name: str, out: Path, step) -> dict:
 
 
 def _cover(out: Path, step) -> dict:
-    from asflown.craft.load import load_craft
-    from asflown.estimate.actuation import actuation_summary, stall_time
-    from asflown.estimate.compare import compare_torques
-    from asflown.estimate.subject import subject_of
-    from asflown.estimate.torque import disturbance_torque
-    from asflown.plots import actuation
-    from asflown.plots.figure import save
+    from ..campaigns.deployment import actuation_summary, stall_time
+    from ..craft.load import load_craft
+    from ..estimate.subject import subject_of
+    from ..estimate.torque import compare_torques, disturbance_torque
+    from ..plots import actuation
+    from ..plots.figure import save
 
     craft = load_craft("cassini")
     step("cover-deploy: flying")
@@ -151,14 +150,13 @@ def _cover(out: Path, step) -> dict:
 
 def _mission(out: Path) -> dict:
     """Eleven years of a cover flown, analysed, kept and judged, as `simulate`, `trend add` and `report` do; beside the truth."""
-    from asflown.craft.load import load_craft
-    from asflown.report.page import write_report
-    from asflown.sim.fly_mission import fly_mission
-    from asflown.trends.board import healths_in
-    from asflown.trends.events import load_events
-    from asflown.trends.record import figure_record
-    from asflown.trends.store import TrendStore
-
+    from ..craft.load import load_craft
+    from ..report.page import write_report
+    from ..sim.mission import fly_mission
+    from ..trends.board import healths_in
+    from ..trends.entries import load_events
+    from ..trends.record import figure_record
+    from ..trends.store import TrendStore
     from .trend import analysed
 
     say("a mission of 20 actuations: flying")

@@ -68,8 +68,8 @@ def density(
     json: bool = JSON,
 ) -> None:
     """Density of the gas that a craft meets in a flyby, from the torque it exerts."""
-    from asflown.estimate.density import density as density_of
-    from asflown.kit.files import check_folder
+    from ..estimate.density import density as density_of
+    from ..kit.files import check_folder
 
     check_picture(plot)
     if plot_dir is not None:
@@ -81,13 +81,13 @@ def density(
     given = sources_from(source, path)
     result = density_of(telemetry, ship, path, closest_approach, variant=variant, sources=given, **drag)
     if plot is not None:
-        from asflown.plots.density import save_density_figure
+        from ..plots.density import save_density_figure
 
         save_density_figure(result, plot)
         say(f"wrote {plot}")
     if plot_dir is not None:
-        from asflown.plots.figure import save_figures
-        from asflown.plots.flyby import flyby_figures
+        from ..plots.figure import save_figures
+        from ..plots.flyby import flyby_figures
 
         for path in save_figures(flyby_figures(result, telemetry, ship, sources=given), plot_dir):
             say(f"wrote {path}")

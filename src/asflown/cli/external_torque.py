@@ -48,8 +48,8 @@ def external_torque(
     json: bool = JSON,
 ) -> None:
     """The steady external torque on the craft, from the momentum it gains."""
-    from asflown.estimate.external_torque import external_torque as steady_torque
-    from asflown.kit.quantities import numbers
+    from ..estimate.external import external_torque as steady_torque
+    from ..kit.quantities import numbers
 
     check_picture(plot)
     ship = craft_from(craft, inertia, None)
@@ -57,7 +57,7 @@ def external_torque(
     telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
     result = steady_torque(telemetry, ship, method=method, variant=variant, frame=frame, turn_rad_s=turn)
     if plot is not None:
-        from asflown.plots.external_torque import save_external_torque_figure
+        from ..plots.external_torque import save_external_torque_figure
 
         save_external_torque_figure(result, plot)
         say(f"wrote {plot}")

@@ -36,10 +36,10 @@ KERNELS = typer.Option(
 
 def flyby_from(name: str, closest: str, trajectory, kernels, telemetry, craft):
     """The flyby that --flyby names, along a trajectory where one is given; and its inputs' SHA-256."""
-    from asflown.dynamics.flyby import flyby_called
-    from asflown.dynamics.trajectory import Trajectory
-    from asflown.kit.errors import BadInput
-    from asflown.kit.timeline import NS
+    from ..dynamics.flyby import flyby_called
+    from ..dynamics.trajectory import Trajectory
+    from ..kit.errors import BadInput
+    from ..kit.timeline import NS
 
     flyby = flyby_called(name)
     if trajectory is None and not kernels:
@@ -48,11 +48,11 @@ def flyby_from(name: str, closest: str, trajectory, kernels, telemetry, craft):
         raise BadInput("--trajectory and --kernels both give the path", remedy="Give one of them.")
     closest_ns = telemetry.moment(closest)
     if trajectory is not None:
-        from asflown.telemetry.trajectory import load_trajectory
+        from ..telemetry.trajectory import load_trajectory
 
         table, source = load_trajectory(trajectory), str(trajectory)
     else:
-        from asflown.telemetry.kernels import trajectory_from_kernels
+        from ..telemetry.kernels import trajectory_from_kernels
 
         source = ", ".join(map(str, kernels))
         table = trajectory_from_kernels(kernels, craft.name.upper(), flyby.moon.name, closest_ns)
@@ -72,7 +72,7 @@ def flyby_from(name: str, closest: str, trajectory, kernels, telemetry, craft):
 
 def drag_from(axis, method, area, arm, velocity, up, drag_table) -> dict:
     """What these options say, as ``estimate.density.density`` takes it."""
-    from asflown.kit.quantities import plain_numbers, quantity
+    from ..kit.quantities import plain_numbers, quantity
 
     return {
         "axis": axis,
@@ -93,10 +93,10 @@ def sources_from(texts: list[str] | None, flyby):
         return None
     import numpy as np
 
-    from asflown.dynamics.plume import Jet, as_passed
-    from asflown.dynamics.trajectory import Trajectory
-    from asflown.kit.errors import BadInput
-    from asflown.kit.quantities import quantity
+    from ..dynamics.plume import Jet, as_passed
+    from ..dynamics.trajectory import Trajectory
+    from ..kit.errors import BadInput
+    from ..kit.quantities import quantity
 
     found = []
     for text in texts:

@@ -56,11 +56,9 @@ def fit(
     json: bool = JSON,
 ) -> None:
     """Fixed and proportional sigmas and biases of magnitude and pointing, with intervals, outliers, influence and doubts."""
-    from asflown.estimate.gates_fit import fit_gates
-    from asflown.estimate.gates_judge import judge_gates
-    from asflown.estimate.gates_patch import across_patch
-    from asflown.kit.errors import BadInput
-    from asflown.kit.files import check_folder
+    from ..estimate.gates import across_patch, fit_gates, judge_gates
+    from ..kit.errors import BadInput
+    from ..kit.files import check_folder
 
     if removed is not None and patch is None:
         raise BadInput(
@@ -69,7 +67,7 @@ def fit(
     if plot_dir is not None:
         check_folder(plot_dir)
     if report is not None:
-        from asflown.report.gates_page import check_report
+        from ..report.gates_page import check_report
 
         check_report(report)
     burns = maneuvers_from(file, engine, without)
@@ -93,17 +91,17 @@ def fit(
         "doubts": doubts, "provenance": provenance({burns.source: burns.sha256} | hashes(prior, against), options, seed),
     }  # fmt: skip
     if store is not None:
-        from asflown.trends.gates_entry import gates_entry
+        from ..trends.entries import gates_entry
 
         keep(store, gates_entry(result, craft_from(craft, None, None), name, record["provenance"]))
     if plot_dir is not None:
-        from asflown.plots.figure import save_figures
-        from asflown.plots.maneuvers import gates_figures
+        from ..plots.figure import save_figures
+        from ..plots.maneuvers import gates_figures
 
         for path in save_figures(gates_figures(result, judged), plot_dir):
             say(f"wrote {path}")
     if report is not None:
-        from asflown.report.gates_page import write_gates_report
+        from ..report.gates_page import write_gates_report
 
         say(f"wrote {report} and {write_gates_report(result, judged, compared, record, report)}")
     if json:
@@ -126,9 +124,9 @@ def history(
     engine: str = typer.Option(None, "--engine", help="main-engine or rcs; both unless given."), json: bool = JSON
 ) -> None:
     """Cassini's execution-error models and biases from launch to 2012, as published."""
-    from asflown.kit.errors import BadInput
-    from asflown.maneuvers.history import MAIN_ENGINE, RCS, engine_called
-    from asflown.maneuvers.history import history as models
+    from ..kit.errors import BadInput
+    from ..maneuvers.history import MAIN_ENGINE, RCS, engine_called
+    from ..maneuvers.history import history as models
 
     kind = None if engine is None else engine_called(engine)
     if engine is not None and kind is None:

@@ -29,13 +29,13 @@ def simulate(
 
     import numpy as np
 
-    from asflown.kit.errors import BadInput
-    from asflown.kit.files import check_place
-    from asflown.kit.quantities import quantity
-    from asflown.kit.timeline import utc_to_tai_ns
-    from asflown.maneuvers.history import RCS, past_model
-    from asflown.maneuvers.write import write_maneuvers
-    from asflown.sim.maneuver_sets import MAIN_ENGINE_SET, RCS_SET, execute
+    from ..kit.errors import BadInput
+    from ..kit.files import check_place
+    from ..kit.quantities import quantity
+    from ..kit.timeline import utc_to_tai_ns
+    from ..maneuvers.history import RCS, past_model
+    from ..maneuvers.write import write_maneuvers
+    from ..sim.maneuver_sets import MAIN_ENGINE_SET, RCS_SET, execute
 
     check_place(out)
     past = past_model(by)

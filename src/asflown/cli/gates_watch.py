@@ -22,8 +22,8 @@ def watch(
     json: bool = JSON,
 ) -> None:
     """Each new burn against the model before it: outliers, cumulated sums, the change point, and what could have been seen.  Exit 3 on alarm."""
-    from asflown.estimate.gates_watch import watch_maneuvers
-    from asflown.kit.files import check_folder
+    from ..estimate.gates import watch_maneuvers
+    from ..kit.files import check_folder
 
     if plot_dir is not None:
         check_folder(plot_dir)
@@ -31,8 +31,8 @@ def watch(
     result = watch_maneuvers(burns, first=first, against=past_named(against, burns.engine[0]), false_alarm=false_alarm)
     options = {"engine": engine, "from": first, "against": against, "false_alarm": false_alarm, "without": without}
     if plot_dir is not None:
-        from asflown.plots.figure import save_figures
-        from asflown.plots.maneuvers import degradation_figure, watch_figure
+        from ..plots.figure import save_figures
+        from ..plots.maneuvers import degradation_figure, watch_figure
 
         for path in save_figures(
             {"watch": watch_figure(result), "degradation": degradation_figure(result, burns)}, plot_dir
@@ -65,11 +65,11 @@ def predict(
     json: bool = JSON,
 ) -> None:
     """Execution errors to be expected of burns yet to be flown: means, covariances, the 95 % ellipsoid, samples."""
-    from asflown.estimate.gates_fit import fit_gates
-    from asflown.estimate.gates_use import predict as predicted
-    from asflown.kit.errors import BadInput
-    from asflown.kit.files import check_place
-    from asflown.maneuvers.plan import load_plan
+    from ..estimate.gates import fit_gates
+    from ..estimate.gates import predict as predicted
+    from ..kit.errors import BadInput
+    from ..kit.files import check_place
+    from ..maneuvers.plan import load_plan
 
     if (by is None) == (past is None):
         raise BadInput(
@@ -111,7 +111,7 @@ def _write_samples(result, count: int, seed: int, out: Path) -> None:
 
     import numpy as np
 
-    from asflown.kit.files import write_text
+    from ..kit.files import write_text
 
     rng = np.random.default_rng(seed)
     text = io.StringIO()

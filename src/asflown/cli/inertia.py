@@ -62,8 +62,8 @@ def fit(
     json: bool = JSON,
 ) -> None:
     """Inertia tensor as flown and external torque, from reaction-wheel slews."""
-    from asflown.estimate.inertia import inertia_tensor
-    from asflown.kit.quantities import quantity
+    from ..estimate.inertia import inertia_tensor
+    from ..kit.quantities import quantity
 
     check_picture(plot)
     ship = craft_from(craft, inertia, None)
@@ -76,11 +76,11 @@ def fit(
                "start": start, "stop": stop, "inertia": inertia}  # fmt: skip
     origin = provenance(inputs | hashes(craft), options)
     if store is not None:
-        from asflown.trends.inertia_entry import inertia_entry
+        from ..trends.entries import inertia_entry
 
         keep(store, inertia_entry(result, telemetry, ship, name, origin))
     if plot is not None:
-        from asflown.plots.inertia import save_inertia_figure
+        from ..plots.inertia import save_inertia_figure
 
         save_inertia_figure(result, plot)
         say(f"wrote {plot}")

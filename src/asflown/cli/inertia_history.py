@@ -14,13 +14,13 @@ def history(
     json: bool = JSON,
 ) -> None:
     """Tensors estimated and predicted over the mission, as the craft file has them (001 Table 1)."""
-    from asflown.estimate.inertia_prediction import compared_history
-    from asflown.trends.inertia_entry import history_entries
+    from ..estimate.inertia import compared_history
+    from ..trends.entries import history_entries
 
     ship = craft_from(craft, None, None)
     windows = compared_history(ship)
     if store is not None:
-        from asflown.trends.store import TrendStore
+        from ..trends.store import TrendStore
 
         with TrendStore.open(store) as trends:
             kept = trends.add(history_entries(ship))

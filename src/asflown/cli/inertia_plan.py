@@ -27,9 +27,9 @@ def plan(
     json: bool = JSON,
 ) -> None:
     """The slew that would tell most of the inertia tensor, and the sigmas it would leave."""
-    from asflown.estimate.slew_plan import plan_slew, what_was_flown
-    from asflown.kit.quantities import quantity
-    from asflown.kit.timeline import utc_to_tai_ns
+    from ..estimate.inertia import plan_slew, what_was_flown
+    from ..kit.quantities import quantity
+    from ..kit.timeline import utc_to_tai_ns
 
     ship = craft_from(craft, inertia, None)
     turn = {

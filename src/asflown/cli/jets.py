@@ -72,8 +72,8 @@ def jets(
     json: bool = JSON,
 ) -> None:
     """Densities and widths of a plume's jets, from what they did to a craft; what the telemetry does not tell is said."""
-    from asflown.estimate.jets import jets as fitted_jets
-    from asflown.kit.files import check_folder
+    from ..estimate.jets import jets as fitted_jets
+    from ..kit.files import check_folder
 
     check_picture(plot)
     if plot_dir is not None:
@@ -88,13 +88,13 @@ def jets(
         power=power, angle=angle, **drag,
     )  # fmt: skip
     if plot is not None:
-        from asflown.plots.density import save_jets_figure
+        from ..plots.density import save_jets_figure
 
         save_jets_figure(result, plot)
         say(f"wrote {plot}")
     if plot_dir is not None:
-        from asflown.plots.figure import save_figures
-        from asflown.plots.flyby import flyby_figures
+        from ..plots.figure import save_figures
+        from ..plots.flyby import flyby_figures
 
         for path in save_figures(flyby_figures(result.density, telemetry, ship, result), plot_dir):
             say(f"wrote {path}")

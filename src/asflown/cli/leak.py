@@ -72,9 +72,8 @@ def leak(
     json: bool = JSON,
 ) -> None:
     """Leaking and weak thrusters, from momentum that orders do not explain.  Exit code 3 on an alarm."""
-    from asflown.estimate.leak import LeakWatch
-    from asflown.estimate.leak_known import known_for
-    from asflown.kit.quantities import numbers, quantity
+    from ..estimate.leak import LeakWatch, known_for
+    from ..kit.quantities import numbers, quantity
 
     check_picture(plot)
     ship = craft_from(craft, inertia, cm)
@@ -105,7 +104,7 @@ def leak(
         watch.take(telemetry, final=True)
     result = watch.result()
     if plot is not None:
-        from asflown.plots.leak import save_leak_figure
+        from ..plots.leak import save_leak_figure
 
         save_leak_figure(result, plot)
         say(f"wrote {plot}")
@@ -124,8 +123,8 @@ def leak(
 
 def _followed(watch, file: Path, patience: float, read) -> None:
     """Take the file as it grows, until an alarm or its end."""
-    from asflown.kit.errors import BadInput
-    from asflown.telemetry.growing import growing
+    from ..kit.errors import BadInput
+    from ..telemetry.growing import growing
 
     for telemetry, last in growing(file, read, patience_s=patience):
         try:

@@ -57,7 +57,7 @@ def _program(
     context: typer.Context, version: bool = typer.Option(False, "--version", help="Print the version and stop.")
 ) -> None:
     if version:
-        from asflown import __version__
+        from .. import __version__
 
         print(f"asflown {__version__}")
         raise typer.Exit()
@@ -67,7 +67,7 @@ def _program(
 
 def main() -> None:
     """Run one verb; bad input and usage become one message on standard error and exit code 2."""
-    from asflown.kit.errors import BadInput
+    from ..kit.errors import BadInput
 
     code: object
     try:

@@ -18,7 +18,7 @@ AGAINST = typer.Option(
 
 def maneuvers_from(file: Path, engine: str | None, without: str | None):
     """The maneuvers of one engine, without some."""
-    from asflown.maneuvers.table import load_maneuvers
+    from ..maneuvers.table import load_maneuvers
 
     burns = load_maneuvers(file).of(engine)
     return burns if without is None else burns.without([w.strip() for w in without.split(",")], "left out by --without")
@@ -26,8 +26,8 @@ def maneuvers_from(file: Path, engine: str | None, without: str | None):
 
 def past_named(name: str | None, engine: str):
     """A model of the history, or of an earlier fit's JSON; ``engine``, as the file calls it, says whose where the name does not."""
-    from asflown.maneuvers.earlier import earlier_model
-    from asflown.maneuvers.history import past_model
+    from ..maneuvers.earlier import earlier_model
+    from ..maneuvers.history import past_model
 
     if name is None:
         return None
@@ -36,9 +36,9 @@ def past_named(name: str | None, engine: str):
 
 def held(asked: list[str], engine: str) -> dict[str, float]:
     """'pointing_fixed=0 mm/s' or 'pointing=2000' (a model of the history) -> terms and their values."""
-    from asflown.estimate.gates_fit import TERMS
-    from asflown.kit.errors import BadInput, some_of
-    from asflown.kit.quantities import quantity
+    from ..estimate.gates import TERMS
+    from ..kit.errors import BadInput, some_of
+    from ..kit.quantities import quantity
 
     found: dict[str, float] = {}
     for text in asked:
@@ -64,8 +64,8 @@ def held(asked: list[str], engine: str) -> dict[str, float]:
 
 def removed_bias(text: str | None) -> tuple[float, float]:
     """'-4 mm/s, 0.03 %' -> m/s and a fraction; the second may be left out."""
-    from asflown.kit.errors import BadInput
-    from asflown.kit.quantities import quantity
+    from ..kit.errors import BadInput
+    from ..kit.quantities import quantity
 
     parts = [p.strip() for p in (text or "0 mm/s").split(",")]
     if len(parts) > 2:

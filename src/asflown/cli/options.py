@@ -28,8 +28,8 @@ JSON = typer.Option(False, "--json", help="One JSON object on standard output.")
 
 def craft_from(name: str, inertia: str | None, cm: str | None):
     """The craft that --craft, --inertia and --cm name."""
-    from asflown.craft.load import load_craft
-    from asflown.kit.quantities import plain_numbers
+    from ..craft.load import load_craft
+    from ..kit.quantities import plain_numbers
 
     return load_craft(
         name,
@@ -40,7 +40,7 @@ def craft_from(name: str, inertia: str | None, cm: str | None):
 
 def numbers_of(text: str, option: str) -> list[float]:
     """'5,10,15' -> numbers."""
-    from asflown.kit.errors import BadInput
+    from ..kit.errors import BadInput
 
     try:
         return [float(part) for part in text.split(",")]
@@ -50,14 +50,14 @@ def numbers_of(text: str, option: str) -> list[float]:
 
 def hashes(*files) -> dict[str, str]:
     """SHA-256 of every file named, for the provenance; what is no file (a built-in name, None) is passed over."""
-    from asflown.kit.files import sha256_of
+    from ..kit.files import sha256_of
 
     return {str(f): sha256_of(Path(f).read_bytes()) for f in files if f is not None and Path(f).is_file()}
 
 
 def telemetry_from(file: Path, channels, exclude, start, stop, craft):
     """Telemetry through the door, cut to the window.  Returns it and the inputs' SHA-256."""
-    from asflown.telemetry.load import load_telemetry
+    from ..telemetry.load import load_telemetry
 
     whole = load_telemetry(file, channels=channels, exclude=exclude, craft=craft)
     return whole.between(start, stop), {whole.source: whole.sha256} | hashes(channels, exclude)
@@ -66,8 +66,8 @@ def telemetry_from(file: Path, channels, exclude, start, stop, craft):
 def check_picture(place: Path | None) -> None:
     """Before the work: whether a picture can be drawn there (None: none is asked for)."""
     if place is not None:
-        from asflown.kit.files import check_place
-        from asflown.plots.figure import picture_kind
+        from ..kit.files import check_place
+        from ..plots.figure import picture_kind
 
         check_place(place)
         picture_kind(place)

@@ -7,7 +7,7 @@ import shutil
 import sys
 import textwrap
 
-from asflown.kit.plain import plain
+from ..kit.plain import plain
 
 
 def print_json(record: dict) -> None:
@@ -38,7 +38,7 @@ def say(text: str = "") -> None:
 
 def keep(store: str, entry) -> None:
     """An entry into a trend store, and what it is kept as."""
-    from asflown.trends.store import TrendStore
+    from ..trends.store import TrendStore
 
     with TrendStore.open(store) as trends:
         kept = trends.add(entry)[0]

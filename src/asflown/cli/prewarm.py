@@ -5,10 +5,10 @@ from __future__ import annotations
 
 def prewarm() -> None:
     """Short flights, a torque by the fused method, a tensor from a slew: all array types the kernels will ever see."""
-    from asflown.craft.load import load_craft
-    from asflown.estimate.inertia import inertia_tensor
-    from asflown.estimate.torque import disturbance_torque
-    from asflown.sim.fly import fly
+    from ..craft.load import load_craft
+    from ..estimate.inertia import inertia_tensor
+    from ..estimate.torque import disturbance_torque
+    from ..sim.flight import fly
 
     flight = fly("quiet", duration="120 s", settle="0 s")
     disturbance_torque(flight.telemetry, load_craft("cassini"), method="fused", axis="y")

@@ -19,15 +19,15 @@ def report(
     json: bool = JSON,
 ) -> None:
     """Write one page for the anomaly board: verdict first, then trends, overlays, cold against warm, devices, provenance."""
-    from asflown.kit.errors import BadInput
-    from asflown.kit.files import check_place
+    from ..kit.errors import BadInput
+    from ..kit.files import check_place
 
     if out.suffix.lower() not in (".html", ".htm"):
         raise BadInput("a report is an HTML page", file=out, remedy="Name it .html.")
     check_place(out)
     check_place(out.with_suffix(".json"))
-    from asflown.report.page import write_report
-    from asflown.trends.board import healths_in
+    from ..report.page import write_report
+    from ..trends.board import healths_in
 
     healths = healths_in(store, craft, limit)
     origin = provenance({}, {"store": without_password(store), "craft": craft, "limit": list(limit)})

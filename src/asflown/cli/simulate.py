@@ -28,12 +28,12 @@ def simulate(
     json: bool = JSON,
 ) -> None:
     """Fly a scenario in the closed loop: telemetry as a spacecraft would send it, and the truth beside it."""
-    from asflown.kit.config import changes_of
-    from asflown.kit.errors import BadInput
-    from asflown.kit.files import check_folder
-    from asflown.sim.fly import fly, write_flight
-    from asflown.sim.mission import is_mission
-    from asflown.sim.scenario import load_scenario
+    from ..kit.config import changes_of
+    from ..kit.errors import BadInput
+    from ..kit.files import check_folder
+    from ..sim.flight import fly, write_flight
+    from ..sim.mission import is_mission
+    from ..sim.scenario import load_scenario
 
     check_folder(out)
     options = {"craft": craft, "noise": noise, "set": settings, "inertia": inertia, "cm": cm}
@@ -67,8 +67,7 @@ def simulate(
 
 
 def _simulate_mission(name: str, out: Path, seed: int | None, options: dict, json: bool) -> None:
-    from asflown.sim.fly_mission import fly_mission
-    from asflown.sim.mission import load_mission
+    from ..sim.mission import fly_mission, load_mission
 
     mission = load_mission(name)
     vehicle = craft_from(options["craft"] or mission.craft, options["inertia"], options["cm"])

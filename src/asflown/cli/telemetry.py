@@ -29,7 +29,7 @@ def check(
     Exit code 3 where the data need a look before use: a doubted unit, spikes, a stuck sensor, an
     undeclared wrap, quaternions not of length one, one time stamp with two different values.
     Dropouts, gaps, repeats, duplicates and late samples are reported and respected, exit code 0."""
-    from asflown.telemetry.screening import needs_a_look, summaries
+    from ..telemetry.screening import needs_a_look, summaries
 
     ship = craft_from(craft, inertia, cm) if craft else None
     t, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
@@ -50,7 +50,7 @@ def check(
 @app.command()
 def names(json: bool = JSON) -> None:
     """The channel names asflown knows, with their units."""
-    from asflown.telemetry.channels import AXES, KINDS
+    from ..telemetry.channels import AXES, KINDS
 
     members = {"axis": "|".join(AXES), "component": "w|x|y|z", "wheel": "<WHEEL>", "thruster": "<THRUSTER>"}
     rows = []

@@ -64,9 +64,9 @@ def thrust(
     json: bool = JSON,
 ) -> None:
     """Thrust of every thruster, fall time and centre of mass, from wheel biasing, run-downs and burns."""
-    from asflown.estimate.thrust import thrust as thrust_of
-    from asflown.estimate.thrust_priors import priors_for
-    from asflown.kit.quantities import numbers, quantity
+    from ..estimate.firing import priors_for
+    from ..estimate.thrust import thrust as thrust_of
+    from ..kit.quantities import numbers, quantity
 
     check_picture(plot)
     ship = craft_from(craft, inertia, cm)
@@ -92,11 +92,11 @@ def thrust(
                "inertia": inertia}  # fmt: skip
     origin = provenance(inputs | hashes(craft), options)
     if store is not None:
-        from asflown.trends.thrust_entry import thrust_entry
+        from ..trends.entries import thrust_entry
 
         keep(store, thrust_entry(result, telemetry[0], ship, name, origin))
     if plot is not None:
-        from asflown.plots.thrust import save_thrust_figure
+        from ..plots.thrust import save_thrust_figure
 
         save_thrust_figure(result, plot)
         say(f"wrote {plot}")

@@ -63,9 +63,8 @@ def torque(
     """Reconstruct the disturbance torque on the body from telemetry."""
     from rich.console import Console
 
-    from asflown.estimate.compare import compare_torques
-    from asflown.estimate.torque import disturbance_torque
-    from asflown.kit.files import check_place
+    from ..estimate.torque import compare_torques, disturbance_torque
+    from ..kit.files import check_place
 
     if out is not None:
         check_place(out)
@@ -104,11 +103,11 @@ def torque(
     }  # fmt: skip
     origin = provenance(inputs | hashes(craft), options)
     if out is not None:
-        from asflown.estimate.result import save_csv
+        from ..estimate.torque import save_csv
 
         save_csv(result, out, origin)
     if plot is not None:
-        from asflown.plots.torque import save_torque_figure
+        from ..plots.torque import save_torque_figure
 
         save_torque_figure([result, *others], plot)
     for written in (out, plot):
@@ -128,7 +127,7 @@ def torque(
 
 def _sigmas(text: str | None) -> dict[str, float] | None:
     """'inertia=0.03,delay_s=0.2' -> numbers by name."""
-    from asflown.kit.errors import BadInput
+    from ..kit.errors import BadInput
 
     if text is None:
         return None
@@ -146,8 +145,7 @@ def _sigmas(text: str | None) -> dict[str, float] | None:
 
 def _span_of(text: str, first_s: float, last_s: float) -> tuple[float, float]:
     """'60,141' -> two times within a record. [s]"""
-    from asflown.kit.errors import BadInput
-
+    from ..kit.errors import BadInput
     from .options import numbers_of
 
     span = numbers_of(text, "--impulse")
@@ -169,8 +167,8 @@ def _with_impulse(result, text: str):
 
 def _others(telemetry, ship, result, mechanism):
     """Every other method and variant that this telemetry allows."""
-    from asflown.estimate.torque import disturbance_torque
-    from asflown.kit.errors import BadInput
+    from ..estimate.torque import disturbance_torque
+    from ..kit.errors import BadInput
 
     found = []
     for method, variant in (("momentum", "corrected"), ("momentum", "printed"), ("transfer", "corrected"),

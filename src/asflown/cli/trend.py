@@ -43,7 +43,7 @@ def add(
     """Analyse actuations and keep their figures of merit; an event kept before gets a further revision."""
     from dataclasses import replace
 
-    from asflown.trends.store import TrendStore
+    from ..trends.store import TrendStore
 
     ship = craft_from(craft, inertia, cm)
     chosen, inputs = _events(events, ship, channels, only)
@@ -80,10 +80,10 @@ def add(
 @app.command("list", short_help="Events in the store, with rests and cycles.")
 def list_(store: str = STORE, figure: str = FIGURE, basis: str = BASIS, craft: str = WHOSE, json: bool = JSON) -> None:
     """Events in the store in order of date, with days since the last actuation and cycles used, both from the dates."""
-    from asflown.kit.errors import BadInput, some_of
-    from asflown.trends.board import entries_in
-    from asflown.trends.entry import MOVES
-    from asflown.trends.pairs import cycles, rests, whole_days
+    from ..kit.errors import BadInput, some_of
+    from ..trends.board import entries_in
+    from ..trends.entry import MOVES
+    from ..trends.statistics import cycles, rests, whole_days
 
     entries, name = entries_in(store, craft, curves=False)
     known = {v.figure for e in entries for v in e.values}
@@ -125,9 +125,9 @@ def show(
     json: bool = JSON,
 ) -> None:
     """A figure over the years: robust slope and change with intervals, permutation p-value, what would have been seen."""
-    from asflown.trends.board import health_in
-    from asflown.trends.entry import BEST
-    from asflown.trends.record import figure_record
+    from ..trends.board import health_in
+    from ..trends.entry import BEST
+    from ..trends.record import figure_record
 
     health = health_in(store, craft, kind, limit)
     found = (
@@ -136,8 +136,8 @@ def show(
         else [f for f in health.figures if f.basis in (basis or BEST[0], BEST[1])]
     )
     if plot is not None:
-        from asflown.plots.figure import save
-        from asflown.plots.trend import trend_figure
+        from ..plots.figure import save
+        from ..plots.trend import trend_figure
 
         save(trend_figure(found[0]), plot)
         say(f"wrote {plot}")
@@ -166,9 +166,9 @@ def compare(
     json: bool = JSON,
 ) -> None:
     """Cold actuations against the warm ones after them: certainly no more different than a margin?"""
-    from asflown.kit.errors import BadInput
-    from asflown.trends.board import health_in
-    from asflown.trends.record import cold_warm_record, two_record
+    from ..kit.errors import BadInput
+    from ..trends.board import health_in
+    from ..trends.record import cold_warm_record, two_record
 
     if (first is None) != (second is None):
         raise BadInput("one event alone cannot be compared", remedy="Name two, or none for cold against warm.")
@@ -200,10 +200,10 @@ def watch(
     json: bool = JSON,
 ) -> None:
     """Judge the newest actuation against the family of the past ones: pass, watch or alarm, and why.  Exit 3 on alarm."""
-    from asflown.trends.board import health_in
-    from asflown.trends.entry import BEST
-    from asflown.trends.record import cycles_record, figure_record, shape_record
-    from asflown.trends.verdicts import ORDER
+    from ..trends.board import health_in
+    from ..trends.entry import BEST
+    from ..trends.record import cycles_record, figure_record, shape_record
+    from ..trends.verdicts import ORDER
 
     health = health_in(store, craft, kind, limit, until=event)
     verdict, reasons = health.verdict, list(health.reasons)
@@ -230,9 +230,9 @@ def watch(
 
 def _events(path: Path, ship, channels, only: str | None):
     """Events to analyse and the inputs' SHA-256."""
-    from asflown.kit.errors import BadInput, some_of
-    from asflown.telemetry.load import load_telemetry
-    from asflown.trends.events import find_events, is_event_list, load_events
+    from ..kit.errors import BadInput, some_of
+    from ..telemetry.load import load_telemetry
+    from ..trends.entries import find_events, is_event_list, load_events
 
     found = (
         load_events(path) if is_event_list(path) else find_events(load_telemetry(path, channels=channels, craft=ship))
@@ -278,9 +278,8 @@ def analysed(events, ship, channels=None, figures=None, jobs: int = 0):
 
 
 def _one(event, ship, channels, figures):
-    from asflown.telemetry.load import load_telemetry
-    from asflown.trends.analyse import analyse
-    from asflown.trends.figures import load_figures
+    from ..telemetry.load import load_telemetry
+    from ..trends.entries import analyse, load_figures
 
     if figures is not None:
         load_figures(figures)
@@ -289,6 +288,6 @@ def _one(event, ship, channels, figures):
 
 
 def without_password(store: str) -> str:
-    from asflown.trends.place import label, url_of
+    from ..trends.store import label, url_of
 
     return label(url_of(store))

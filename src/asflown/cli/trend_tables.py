@@ -6,7 +6,7 @@ from .output import wrapped
 
 
 def print_figure(f, rows: bool) -> None:
-    from asflown.trends.record import sudden_words
+    from ..trends.record import sudden_words
 
     t = f.trend
     newest = ""

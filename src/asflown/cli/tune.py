@@ -19,7 +19,7 @@ def tune(
     json: bool = JSON,
 ) -> None:
     """Search the printed method's smoothing span as the paper did, and show what the best one balances."""
-    from asflown.campaigns.tune import SPANS, best_of, remarks, tune
+    from ..campaigns.tune import SPANS, best_of, remarks, tune
 
     ship = craft_from(craft, inertia, cm)
     rises = numbers_of(widths, "--widths")

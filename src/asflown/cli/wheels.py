@@ -40,8 +40,8 @@ def wheels(
     json: bool = JSON,
 ) -> None:
     """Bearing drag of every wheel, drag spikes, dwell at low speed, zero crossings and revolutions."""
-    from asflown.estimate.wheel_drag import wheel_drag
-    from asflown.kit.quantities import quantity
+    from ..estimate.wheels import wheel_drag
+    from ..kit.quantities import quantity
 
     check_picture(plot)
     ship = craft_from(craft, None, None)
@@ -52,11 +52,11 @@ def wheels(
     options = {"craft": craft, "run_down": run_down, "low_speed": low_speed, "start": start, "stop": stop}
     origin = provenance(inputs | hashes(craft), options)
     if store is not None:
-        from asflown.trends.wheel_entry import wheel_entry
+        from ..trends.entries import wheel_entry
 
         keep(store, wheel_entry(result, telemetry, ship, name, origin))
     if plot is not None:
-        from asflown.plots.wheels import save_wheels_figure
+        from ..plots.wheels import save_wheels_figure
 
         save_wheels_figure(result, plot)
         say(f"wrote {plot}")

@@ -428,6 +428,19 @@ class Craft(_Data):
         piece = [h for h in known if h.piece == begun[-1].piece]
         return float(np.interp(float(tai_ns), [float(h.date) for h in piece], [h.thrust for h in piece]))
 
+    def believed_thrust(self, tai_ns: int | None) -> float:
+        """Thrust of each thruster that an estimate starts from: the history's on the date (None: its latest), or the mean
+        of the nominal ones where there is no history. [N]
+
+        Raises BadInput for a craft without thrusters."""
+        if self.thrust_history:
+            return self.thrust_at(max(h.date for h in self.thrust_history) if tai_ns is None else tai_ns)
+        if not self.thrusters:
+            raise BadInput(
+                f"{self.name} has no thrusters", remedy="Describe them under [[thrusters]] in the craft file."
+            )
+        return float(np.mean([t.nominal_thrust for t in self.thrusters]))
+
     def at(self, tai_ns: int | None) -> CraftAt:
         """The craft on a date (None: the latest known state)."""
         doubts: list[str] = []

@@ -242,3 +242,16 @@ def _smooth(A, which, H, start, row, variance, product, covariance, values, stat
             _advance(A[which[k]].T, adjoint, turned, columns)
             adjoint, turned = turned, adjoint
     return kept
+
+
+#: Share of pulls within one sigma of a normal distribution.
+_ONE_SIGMA = 0.6827
+
+
+def spread(samples: np.ndarray) -> np.ndarray:
+    """One sigma of samples (K, ...) with tails: the mean of what their middle 68 % and 95 % each say of it.
+
+    A posterior of corners is narrow with long tails: its standard deviation is that of the tails, its
+    68 % interval that of the middle.  Normal samples give their standard deviation."""
+    low95, low68, high68, high95 = np.quantile(samples, [0.025, 0.1587, 0.8413, 0.975], axis=0)
+    return 0.25 * ((high68 - low68) + (high95 - low95) / 1.96)

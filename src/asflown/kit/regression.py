@@ -386,3 +386,39 @@ def _evaluate(t, y, at, low, high, bandwidth, degree, order):
                 gain[i, o, b] = dot
                 gain[i, b, o] = dot
     return derivatives, gain, own
+
+
+#: Samples beyond this many robust sigma do not count for the line.
+_OUTLYING = 4.0
+
+
+def robust_line(u, y) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """y = c0 + c1 u by repeated least squares without outliers: values (2,), covariance, which samples were used.
+
+    Samples in order of time: where their errors follow each other, the covariance is wider.  Where all u are one
+    the slope is taken as zero with a sigma that says it is not known, and the value at u stands."""
+    u, y = np.asarray(u, float), np.asarray(y, float)
+    scatter = 1.4826 * float(np.median(np.abs(y - np.median(y))))
+    used = np.abs(y - np.median(y)) <= 20 * scatter if scatter > 0 else np.ones(len(y), bool)
+    for _ in range(20):
+        centre, middle = float(u[used].mean()), float(y[used].mean())
+        spread = float(np.sum((u[used] - centre) ** 2))
+        narrow = spread <= 1e-12 * float(np.sum(u[used] ** 2))
+        slope = 0.0 if narrow else float((u[used] - centre) @ y[used]) / spread
+        left = y - middle - slope * (u - centre)
+        scatter = 1.4826 * float(np.median(np.abs(left[used])))
+        again = np.abs(left) <= _OUTLYING * scatter
+        if scatter == 0 or again.sum() < 4 or np.array_equal(again, used):
+            break
+        used = again
+    count = int(used.sum())
+    variance = float(np.sum(left[used] ** 2)) / max(count - 2, 1) * memory(left[used])
+    of_slope = (100 * middle / centre) ** 2 if narrow else variance / spread
+    J = np.array([[1.0, -centre], [0.0, 1.0]])
+    return np.array([middle - slope * centre, slope]), J @ np.diag([variance / count, of_slope]) @ J.T, used
+
+
+def third_difference_sigma(values: np.ndarray) -> float:
+    """Noise of samples (N,) or (N, k) from third differences, in which the motion hardly shows; NaN where they are few."""
+    third = np.diff(values, 3, axis=0)
+    return 1.4826 * float(np.median(np.abs(third))) / np.sqrt(20) if len(third) else float("nan")

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..kit.errors import BadInput
-
-if TYPE_CHECKING:
-    from .table import Maneuvers
 
 #: Name of the correction for accelerometer scale factor or thrust, in ledgers and in the column ``adjusted``.
 SCALE = "scale"
@@ -18,11 +14,9 @@ SCALE = "scale"
 
 @dataclass(frozen=True)
 class Adjustment:
-    """One change of one maneuver's expected dV.  ``change_mps``: of its length; None where it was made before asflown
-    saw the maneuver."""
+    """One change of one maneuver's expected dV."""
 
     name: str
-    change_mps: float | None = None
 
 
 Ledger = tuple[Adjustment, ...]
@@ -45,17 +39,3 @@ def scale_corrected(expected_dv, burn_dv, ratio) -> np.ndarray:
     an accelerometer, eq 7 with c = predicted / onboard thrust for one cut off by time.  Turns and deadband firing are
     not measured by the accelerometer and stay as they are."""
     return np.asarray(expected_dv) + (np.asarray(ratio, float)[:, None] - 1) * np.asarray(burn_dv)
-
-
-def bias_removed(maneuvers: Maneuvers, before: int, fixed_mps: float, proportional: float, name: str) -> Maneuvers:
-    """Maneuvers with a bias of the magnitude taken out of the first ``before``, as if a later patch had been there.
-
-    The error of a maneuver of size v falls by fixed + proportional v (its expected dV rises by as much).
-    Raises BadInput where the ledger says that this was done."""
-    change = fixed_mps + proportional * maneuvers.dv_mps
-    change[before:] = 0.0
-    ledger = tuple(
-        entered(book, Adjustment(name, float(c)), who) if k < before else book
-        for k, (book, c, who) in enumerate(zip(maneuvers.ledger, change, maneuvers.id, strict=True))
-    )
-    return replace(maneuvers, magnitude_error_mps=maneuvers.magnitude_error_mps - change, ledger=ledger)

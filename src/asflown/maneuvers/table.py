@@ -108,6 +108,19 @@ class Maneuvers:
             )  # fmt: skip
         return self.take([e == alike[0] for e in self.engine])
 
+    def with_bias_removed(self, before: int, fixed_mps: float, proportional: float, name: str) -> Maneuvers:
+        """A bias of the magnitude taken out of the first ``before`` maneuvers, as if a later patch had been there.
+
+        The error of a maneuver of size v falls by fixed + proportional v (its expected dV rises by as much).
+        Raises BadInput where the ledger says that this was done."""
+        change = fixed_mps + proportional * self.dv_mps
+        change[before:] = 0.0
+        ledger = tuple(
+            entered(book, Adjustment(name), who) if k < before else book
+            for k, (book, who) in enumerate(zip(self.ledger, self.id, strict=True))
+        )
+        return replace(self, magnitude_error_mps=self.magnitude_error_mps - change, ledger=ledger)
+
     def without(self, ids, reason: str) -> Maneuvers:
         """All but some, the reason kept.  Raises BadInput for an id that is not there, or where none is left."""
         gone = {self.place(i) for i in ids}
@@ -254,12 +267,10 @@ def _vectors(columns: Columns) -> Maneuvers:
         for row in np.flatnonzero(np.abs(ratio - 1) > 0.5)[:1]:
             raise columns.wrong(int(row), "correction_ratio", f"{ratio[row]:g} is far from 1",
                                 "It is estimated over onboard scale factor, or predicted over onboard thrust.")  # fmt: skip
-        before = np.linalg.norm(expected, axis=1)
         expected = scale_corrected(expected, parts["burn_dv"], ratio)
-        change = np.linalg.norm(expected, axis=1) - before
         books = tuple(
-            entered(book, Adjustment(SCALE, float(d)), who) if c != 1 else book
-            for book, c, d, who in zip(books, ratio, change, ids, strict=True)
+            entered(book, Adjustment(SCALE), who) if c != 1 else book
+            for book, c, who in zip(books, ratio, ids, strict=True)
         )
     axes = tvc_axes(expected, craft_x, ids)
     error, pointing, sigma, pointing_covariance = resolved(recon, expected, covariance, axes)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..estimate.result import AXES, TorqueResult
-from ..estimate.subject import Subject, grid_for
-from ..estimate.torque_momentum import smoothed_as_printed, splined, splined_momentum
+from ..estimate.subject import Subject, grid_for, splined
+from ..estimate.torque import TorqueResult, smoothed_as_printed, splined_momentum
+from ..telemetry.channels import AXES
 from ..telemetry.telemetry import Telemetry
 from .figure import BLUE, BY_AXIS, GREEN, GREY, ORANGE, RED, minutes, new_figure
 from .torque import draw_torque, draw_truth

@@ -7,8 +7,8 @@ from itertools import cycle
 import numpy as np
 
 from ..dynamics.plume import jet_density
-from ..estimate.density_result import DensityResult
-from ..estimate.jets_result import JetsResult
+from ..estimate.density import DensityResult
+from ..estimate.jets import JetsResult
 from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, new_figure, save, write_doubts
 
 _PLUME_S = (-60.0, 180.0)  # where jets are met

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..estimate.external_result import AXES, ExternalTorque
+from ..estimate.external import AXES, ExternalTorque
 from .figure import BLUE, GREY, RED, breaks, new_figure, save, write_doubts
 from .torque import time_scale
 

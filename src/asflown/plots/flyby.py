@@ -14,12 +14,11 @@ import numpy as np
 from ..craft.model import Craft
 from ..dynamics.plume import Jet, sources_passed
 from ..dynamics.trajectory import Trajectory
-from ..estimate.density_result import DensityResult
-from ..estimate.external_samples import samples_of
-from ..estimate.jets_result import JetsResult
-from ..estimate.result import AXES
-from ..estimate.subject import subject_of
+from ..estimate.density import DensityResult
+from ..estimate.jets import JetsResult
+from ..estimate.subject import samples_of, subject_of
 from ..kit.errors import BadInput
+from ..telemetry.channels import AXES
 from ..telemetry.telemetry import Telemetry
 from .density import (
     OF_JETS,

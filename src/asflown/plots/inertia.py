@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..estimate.inertia_result import InertiaResult
+from ..estimate.inertia import InertiaResult
 from ..telemetry.channels import AXES
 from .figure import BY_AXIS, GREY, breaks, new_figure, save, write_doubts
 

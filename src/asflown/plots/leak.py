@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..estimate.leak_result import LeakResult
+from ..estimate.leak import LeakResult
 from .figure import BLUE, BY_AXIS, GREY, RED, new_figure, save, write_doubts
 from .torque import time_scale
 

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..estimate.gates_judge import Judgement
-from ..estimate.gates_result import GatesFit
-from ..estimate.gates_tests import Directions
-from ..estimate.gates_watch import Watch
+from ..estimate.gates import Directions, GatesFit, Judgement, Watch
 from ..maneuvers.model import Gates
 from .figure import BLUE, GREEN, GREY, ORANGE, RED, new_figure
 from .labels import label_points

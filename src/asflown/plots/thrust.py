@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..estimate.thrust_result import EventSeen, ThrustResult
+from ..estimate.thrust import EventSeen, ThrustResult
 from .figure import BLUE, BY_AXIS, GREEN, GREY, ORANGE, PURPLE, RED, new_figure, save, write_doubts
 from .torque import time_scale
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..estimate.result import AXES, TorqueResult
+from ..estimate.torque import TorqueResult
+from ..telemetry.channels import AXES
 from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, new_figure, save, write_doubts
 
 _COLORS = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, "black")

@@ -6,11 +6,9 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from ..trends.curves import TORQUE, family_band
+from ..trends.entries import FIRST_PHASE_S
 from ..trends.entry import Entry
-from ..trends.figures import FIRST_PHASE_S
-from ..trends.pairs import Pair
-from ..trends.slope import FEWEST, YEAR
+from ..trends.statistics import FEWEST, TORQUE, YEAR, Pair, family_band
 from ..trends.verdicts import FigureHealth
 from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, new_figure
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..estimate.wheel_result import RUN_DOWN, WheelDrag, WheelsResult
+from ..estimate.wheels import RUN_DOWN, WheelDrag, WheelsResult
 from .figure import BLUE, GREEN, GREY, ORANGE, RED, breaks, new_figure, save, write_doubts
 from .torque import time_scale
 

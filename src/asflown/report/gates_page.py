@@ -5,10 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from ..estimate.gates_judge import Judgement
-from ..estimate.gates_patch import Patch
-from ..estimate.gates_result import GatesFit
-from ..estimate.gates_watch import FEWEST_BEFORE, Watch, watch_maneuvers
+from ..estimate.gates import FEWEST_BEFORE, GatesFit, Judgement, Patch, Watch, watch_maneuvers
 from ..kit.errors import BadInput
 from ..kit.files import check_place, write_text
 from ..kit.plain import plain

@@ -12,7 +12,7 @@ import numpy as np
 from ..kit.files import write_text
 from ..kit.plain import plain
 from ..plots import trend as draw
-from ..trends.analyse import BASES
+from ..trends.entries import BASES
 from ..trends.entry import MOVES
 from ..trends.record import health_record, sudden_words
 from ..trends.verdicts import FigureHealth, Health

@@ -31,8 +31,8 @@ from ..kit.errors import BadInput, some_of
 from ..kit.quantities import quantity
 from ..kit.rotations import lvlh_to_inertial, quaternion, rotation
 from ..kit.timeline import NS
+from .assemble import Read, Use, assembled
 from .channels import AXES, kind_of, split_header, to_si
-from .load import Read, Use, assembled
 from .tables import Table, divided, numbers_of
 from .telemetry import Channel, Finding
 

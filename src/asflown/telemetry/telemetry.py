@@ -114,6 +114,11 @@ class Telemetry:
         return all(f"{stem}_{a}" in self.channels for a in AXES)
 
     @property
+    def date_ns(self) -> int | None:
+        """The epoch (ns TAI), or None where the file gives no date: the craft's latest known state then holds."""
+        return self.epoch_ns if self.dated else None
+
+    @property
     def epoch_label(self) -> str:
         return f"{utc_label(self.epoch_ns)} UTC" if self.dated else "not given"
 

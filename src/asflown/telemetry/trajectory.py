@@ -16,8 +16,8 @@ import numpy as np
 from ..kit.errors import BadInput
 from ..kit.files import sha256_of
 from ..kit.quantities import si_factor
+from .assemble import origin_of, time_scale
 from .channels import AXES, split_header
-from .load import origin_of, time_scale
 from .tables import Table, numbers_of, read_csv, times_of
 
 _FEWEST = 4

@@ -5,11 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..kit.errors import BadInput, some_of
-from .curves import TORQUE, distance
 from .entry import BEST
-from .newest import Newest
-from .pairs import COLD_DAYS, WARM_DAYS, Equivalence, whole_days
-from .slope import Trend
+from .statistics import COLD_DAYS, TORQUE, WARM_DAYS, Equivalence, Newest, Trend, distance, whole_days
 from .verdicts import FigureHealth, Health, date_of
 
 #: Sudden and slow changes for which the power is stated. [%]

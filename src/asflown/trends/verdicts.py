@@ -14,25 +14,36 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 
 from ..kit.errors import BadInput, some_of
-from .change import FEW, Step, step_of
-from .curves import TORQUE, Shape, shape_of
+from .entries import END_WITHIN, FIGURES
 from .entry import BEST, MOVES, Entry
-from .figures import END_WITHIN, FIGURES
-from .newest import FEWEST_PAST, Newest, newest_of
-from .pairs import (
+from .statistics import (
     COLD_DAYS,
+    FEW,
+    FEWEST,
+    FEWEST_PAST,
     MARGIN,
+    TORQUE,
     WARM_DAYS,
+    YEAR,
     Distances,
     Equivalence,
+    Newest,
     Pair,
+    Shape,
+    Step,
+    Trend,
+    Values,
     curve_distances,
     cycles,
     equivalence,
     find_pairs,
+    holm,
+    newest_of,
     rests,
-)  # fmt: skip
-from .slope import FEWEST, YEAR, Trend, Values, holm, trend_of
+    shape_of,
+    step_of,
+    trend_of,
+)
 
 #: Adjusted p-values below which a figure is out of line, and unusual.
 ALARM, WATCH = 0.05, 0.10

@@ -1,0 +1,224 @@
+"""A torque of straight lines: which corners, how sharp, and how rough between them.
+
+The torque is a line with bends, T(t) = T0 + S0 t + sum_i b_i max(t - t_i, 0), plus a roughness in
+proportion to the size the torque has thereabouts.  Everything else in the loop is Gaussian, so each
+candidate bend is one column of responses; once the filter has whitened columns and data, what is left is
+a regression with unit noise in which most coefficients are exactly zero.  Reversible-jump Monte Carlo
+goes through sets of corners (born, removed, moved, split, merged) with the bends integrated out:
+
+    y = X b + D d + e,   b_i ~ N(0, s^2 / l_i), l_i gamma (Student-t bends),   number of corners: beta-binomial
+
+and through a few sizes of roughness and the smooth torque of the fitted levels, each with its own whitening.  D holds the sensitivities to what is
+taken as known (an inertia, a gain), d ~ N(0, 1) how far off each is.  A pure triangle keeps its corners
+sharp, since a straight line costs nothing; a rubbing hinge gets its roughness, since the data ask for it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from ...kit.ensemble import Gains, gains, paths, simulate, spread, whiten
+from ...kit.smoother import Measurements
+from .body import Body, Levels, Posterior, response
+from .corner_sampler import sample
+from .peaks import excursions, peak_scale
+from .series import Times
+
+#: Sizes of the roughness as shares of the torque's own size near that time, and time scales, short of what the telemetry
+#: resolves (studies/corners.py). [1], [s]
+ROUGHNESS = ((0.05, 4.0), (0.15, 4.0), (0.45, 4.0))
+#: What is given beforehand: nearly half to a torque of pure lines, as much to one with roughness; the last to the
+#: smooth torque of the fitted levels (studies/corners.py).
+_PRIOR = (0.45, 0.1, 0.2, 0.175, 0.075)
+#: What "thereabouts" means. [s]
+_NEARBY_S = 10.0
+#: Degrees of freedom of the bends: Cauchy, so that one sharp corner does not widen all others.
+BEND_FREEDOM = 1.0
+#: Beta prior of the share of instants that are corners: one in a minute, to a factor of e, however near the candidates.
+_CORNER_PRIOR = (1.0, 60.0)
+#: Most candidate instants; a longer record has them further apart, to at most COARSEST_S. [s]
+_CANDIDATES, COARSEST_S = 1200, 5.0
+#: Proposals for each candidate instant, the fewest in all, and the share thrown away.
+_PROPOSALS, _LEAST_PROPOSALS, _BURN_IN = 50, 30_000, 0.4
+#: Chains whose draws are put together: one alone may stay with few corners and much roughness, or many and little.
+_CHAINS = 4
+#: Innovations whose mean square is above 1 by this many standard errors are not explained. [sigma]
+_UNEXPLAINED = 5.0
+#: Pure lines are as sure as they look: their flights would say 1.0 (0.8 to 1.1, studies/peak_scale.py), and take half as long as all else.
+_SURE_OF_LINES = 0.5
+#: Flights of the model itself that the peaks' sigma is held against; their share of the proposals, and draws of each.
+_FLIGHTS, _FLOWN_PROPOSALS, _FLOWN_DRAWS = 8, 0.5, 80
+
+
+def spacing_s(duration_s: float, step_s: float) -> float:
+    """Distance of candidate corners in a record of that length. [s]"""
+    return step_s * max(1, math.ceil(duration_s / step_s / _CANDIDATES))
+
+
+@dataclass(frozen=True)
+class _Way:
+    """One roughness: its filter, the columns whitened by it, and their normal equations."""
+
+    gains: Gains
+    columns: np.ndarray  # (M, C)
+    gram: np.ndarray  # (C, C)
+
+    @classmethod
+    def of(cls, g: Gains, seen: np.ndarray, begin: np.ndarray) -> _Way:
+        X = whiten(g, seen, begin)
+        return cls(g, X, X.T @ X)
+
+
+@dataclass(frozen=True)
+class _Search:
+    """What does not depend on the values measured: candidate corners, their responses, and priors.
+
+    Columns are the line's two, those of what is taken as known, and a bend at every candidate."""
+
+    body: Body
+    times: Times
+    basis: np.ndarray  # (N, 2 + candidates), torque of a unit of each [N m]
+    seen: np.ndarray  # (M, C), what of it is measured
+    always: np.ndarray  # prior sigma of the columns that are in every set
+    bend_variance: float
+    corner_prior: np.ndarray
+    proposals: int
+    rng: np.random.Generator
+
+    @property
+    def fixed(self) -> int:
+        return len(self.always)
+
+    def lines(self, coefficients: np.ndarray) -> np.ndarray:
+        """Torques (K, N) of coefficients (K, C), without roughness."""
+        return np.delete(coefficients, np.s_[2 : self.fixed], axis=1) @ self.basis.T
+
+    def walk(
+        self,
+        ways: list[_Way],
+        prior,
+        own: list[np.ndarray],
+        evidence,
+        start: np.ndarray,
+        count: int,
+        effort=1.0,
+        level=0,
+    ):
+        """Coefficients (K, C), numbers of corners and roughness of ``count`` draws; ``own``: data whitened in each way (M,)."""
+        b = np.array([w.columns.T @ o for w, o in zip(ways, own, strict=True)])
+        proposals = int(effort * self.proposals)
+        return sample(
+            np.array([w.gram for w in ways]), b, np.array(evidence), np.log(prior), self.always, self.bend_variance, self.corner_prior, BEND_FREEDOM,
+            proposals, int(_BURN_IN * proposals), count, start, level, self.rng,
+        )  # fmt: skip
+
+    def torques(self, ways: list[_Way], value: np.ndarray, coefficients: np.ndarray, which: np.ndarray) -> np.ndarray:
+        """Torques (K, N) of draws given the measurements (M,), their roughness drawn too."""
+        torque = self.lines(coefficients)
+        residual = value[:, None] - self.seen @ coefficients.T
+        for k in range(1, len(ways)):
+            mine = which == k
+            if mine.any():
+                added = paths(ways[k].gains, residual[:, mine], [self.body.torque], self.rng)[:, :, 0]
+                torque[mine] += self.body.inertia_kgm2 * added
+        return torque
+
+
+def draw_torques(
+    body: Body,
+    levels: Levels,
+    times: Times,
+    data: Measurements,
+    columns: np.ndarray,
+    count: int,
+    rng: np.random.Generator,
+) -> Posterior:
+    """The posterior of corners, bends and roughness at fixed ``levels``; ``columns``: (M, P), of one sigma each.
+
+    A sampler that has not found what explains the data as well as a smooth torque does is given ten
+    times longer; whether it did in the end stands in ``settings['explained']``."""
+    wanted = times.seconds[times.wanted]
+    every = round(spacing_s(np.ptp(wanted), float(wanted[1] - wanted[0])) / (wanted[1] - wanted[0]))
+    candidates = wanted[::every]
+    t = times.seconds[:, None]
+    basis = np.hstack([np.ones_like(t), t - t[0], np.maximum(t - candidates, 0.0)])
+    lines = response(body, levels, times, data, basis)
+    seen = np.hstack([lines[:, :2], columns, lines[:, 2:]])
+    fixed = 2 + columns.shape[1]
+    begin = np.concatenate([np.zeros(fixed, int), np.searchsorted(times.seconds, candidates)])
+    slope = levels.torque_Nm * math.sqrt(3) / levels.length_s
+    search = _Search(
+        body, times, basis, seen, np.array([levels.torque_Nm, slope, *np.ones(columns.shape[1])]), slope**2,
+        np.array([_CORNER_PRIOR[0], _CORNER_PRIOR[1] / float(candidates[1] - candidates[0])]),
+        max(_LEAST_PROPOSALS, _PROPOSALS * len(candidates)), rng,
+    )  # fmt: skip
+
+    def way(size_Nm, length_s: float) -> _Way:
+        return _Way.of(gains(body.model(levels, times, length_s, size_Nm), data), seen, begin)
+
+    plain = way(np.zeros(len(t)), ROUGHNESS[0][1])
+    first, _, _ = search.walk(
+        [plain], np.ones(1), [plain.gains.own], [plain.gains.log_likelihood], np.empty(0, np.int64), count
+    )
+    found = fixed + np.flatnonzero(first[-1, fixed:])
+    square = np.mean(search.lines(first) ** 2, axis=0)
+    size = np.sqrt(gaussian_filter1d(square, _NEARBY_S / _step(times), mode="nearest"))
+    ways = [plain, *[way(r * size, s) for r, s in ROUGHNESS], way(levels.torque_Nm, levels.length_s)]
+    own, evidence = [w.gains.own for w in ways], [w.gains.log_likelihood for w in ways]
+    for effort in (1, 10):
+        drawn = [search.walk(ways, _PRIOR, own, evidence, found, -(-count // _CHAINS), effort) for _ in range(_CHAINS)]
+        bends, corners, which = (np.concatenate(x)[:count] for x in zip(*drawn, strict=True))
+        usual = int(np.bincount(which).argmax())
+        left = own[usual] - ways[usual].columns @ bends[which == usual].mean(axis=0)
+        explained = np.mean(left**2) < 1 + _UNEXPLAINED * math.sqrt(2 / len(left))
+        if explained:
+            break
+    torque = search.torques(ways, data.value, bends, which)
+    mean, as_lines = torque.mean(axis=0), float(np.mean(which == 0))
+    settings = {
+        "corners": float(corners.mean()),
+        "lines_probability": as_lines,
+        "smooth_probability": float(np.mean(which == len(ways) - 1)),
+        "explained": bool(explained),
+    }
+    if explained and as_lines < _SURE_OF_LINES:
+        shown = times.wanted
+        peaks = excursions(mean[shown], spread(torque[:, shown]))
+        if len(peaks):
+            true, flown = _flown_again(search, ways, levels, data, bends, which, torque)
+            settings["peak_scale"] = peak_scale(times.seconds[shown], mean[shown], peaks, true, flown)
+    return Posterior(mean, torque, bends[:, 2:fixed], left, settings)
+
+
+def _flown_again(search: _Search, ways: list[_Way], levels: Levels, data: Measurements, bends, which, torque):
+    """Some of the drawn torques (F, N wanted), and what is made of each from telemetry the model itself would give of it (F, K, N wanted)."""
+    body, times, rng, fixed = search.body, search.times, search.rng, search.fixed
+    chosen = rng.choice(len(torque), _FLIGHTS, replace=False)
+    quiet = simulate(ways[0].gains.model, data, [body.torque], _FLIGHTS, rng)[1]  # of no torque at all: noise
+    value = (
+        response(body, levels, times, data, torque[chosen].T)
+        + search.seen[:, 2:fixed] @ bends[chosen, 2:fixed].T
+        + quiet
+    )
+    own = [whiten(w.gains, value) for w in ways]
+    wanted, flown = times.wanted, []
+    for k, j in enumerate(chosen):
+        evidence = [
+            w.gains.log_likelihood + 0.5 * (w.gains.own @ w.gains.own - o[:, k] @ o[:, k])
+            for w, o in zip(ways, own, strict=True)
+        ]
+        start = fixed + np.flatnonzero(bends[j, fixed:])
+        again, _, rough = search.walk(
+            ways, _PRIOR, [o[:, k] for o in own], evidence, start, _FLOWN_DRAWS, _FLOWN_PROPOSALS, which[j]
+        )
+        flown.append(search.torques(ways, value[:, k], again, rough)[:, wanted])
+    return torque[chosen][:, wanted], np.array(flown)
+
+
+def _step(times: Times) -> float:
+    """Mean step: the instants are nearly even, and the neighbourhood need not be exact."""
+    return float(np.mean(np.diff(times.seconds)))

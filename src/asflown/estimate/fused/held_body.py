@@ -1,0 +1,128 @@
+"""The closed loop with an unknown torque in it: the controller and its rate filter are known.
+
+One axis has ten states: attitude and rate of the body; the rate filter's four; the wheels' momentum; the
+slow error of the attitude estimate, which the controller flies on; the torque and its slope.
+
+    attitude'  = rate
+    I rate'    = T + u + w_u                     u = I KD (KP e - F(rate)),   e = -(attitude + error)
+    h'         = -u - w_u
+    error'     = -error/time + w_a               a Gauss-Markov process
+
+w_u is what the wheels do beside their command (gyro noise in the loop, friction, a cycle of delay): it
+moves body and wheels oppositely, so total momentum never feels it.  Measured are e, the rate and h.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from ...craft.model import WheelController
+from ...kit.smoother import Measurements, Smoothed
+from .body import Body, Levels, response
+from .series import ATTITUDE_ERROR, BODY_RATE, MOMENTUM, ROWS, Times, channel_of, usual_size, white_noise
+
+_ATTITUDE, _RATE, _FILTER, _STORED, _ERROR, _TORQUE, _STATES = 0, 1, 2, 6, 7, 8, 10
+
+
+@dataclass(frozen=True)
+class LoopLevels(Levels):
+    """Fitted on one axis of a body under known control."""
+
+    rate_white_rad_s: float
+    momentum_white_Nms: float
+    error_white_rad: float
+    error_slow_rad: float
+    error_time_s: float
+    reaction_Nm_sqrt_s: float  # square root of w_u's spectral density
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeldBody(Body):
+    """A body whose controller is known.
+
+    ``delay_s``: of the loop beyond its rate filter, to first order; zero but for asking what a delay would do."""
+
+    kp_per_s: float
+    kd_per_s: float
+    filter_rad_s: float
+    filter_damping: float
+    delay_s: float = 0.0
+
+    STATES: ClassVar[int] = _STATES
+    RATE: ClassVar[int] = _RATE
+    STORED: ClassVar[int] = _STORED
+    SPREAD: ClassVar[tuple[float, ...]] = (1.5, 0.8, 0.7, 0.7, 0.7, 1.0, 0.7, 1.5)
+
+    @classmethod
+    def under(cls, controller: WheelController, inertia_kgm2: float, *, wiener: bool = False) -> HeldBody:
+        f = controller.rate_filter
+        return cls(
+            inertia_kgm2=inertia_kgm2, wiener=wiener, kp_per_s=controller.kp_per_s, kd_per_s=controller.kd_per_s,
+            filter_rad_s=f.natural_frequency, filter_damping=f.damping,
+        )  # fmt: skip
+
+    def dynamics(self, v: LoopLevels) -> tuple[np.ndarray, np.ndarray]:
+        z = self.filter_damping
+        w = 4 * z / (4 * z / self.filter_rad_s + self.delay_s)  # the cascade's delay is 4 z / w
+        stiffness = -self.kd_per_s * self.kp_per_s
+        F, Q = np.zeros((2, _STATES, _STATES))
+        F[_ATTITUDE, _RATE] = 1
+        F[_RATE, [_ATTITUDE, _ERROR, _FILTER + 2, _TORQUE]] = stiffness, stiffness, -self.kd_per_s, 1
+        F[_RATE, _RATE] = -stiffness * self.delay_s
+        F[_STORED] = -F[_RATE]
+        F[_STORED, _TORQUE] = 0
+        for stage, source in ((_FILTER, _RATE), (_FILTER + 2, _FILTER)):
+            F[stage, stage + 1] = 1
+            F[stage + 1, [source, stage, stage + 1]] = w**2, -(w**2), -2 * z * w
+        F[_ERROR, _ERROR] = -1 / v.error_time_s
+        Q[_ERROR, _ERROR] = 2 * v.error_slow_rad**2 / v.error_time_s
+        spread = np.zeros(_STATES)  # where w_u goes
+        spread[_RATE], spread[_STORED] = 1, -1
+        Q += (v.reaction_Nm_sqrt_s / self.inertia_kgm2) ** 2 * np.outer(spread, spread)
+        return F, Q
+
+    def sensitivities(self, v: LoopLevels, times: Times, data: Measurements, best: Smoothed) -> dict[str, np.ndarray]:
+        """The torque's own answer under other numbers; per unit inertia the loop has the craft's own gains."""
+        torque = self.inertia_kgm2 * best.mean[:, _TORQUE]
+        here = response(self, v, times, data, torque)
+        stored = channel_of(times, data) == MOMENTUM
+        changes = {
+            "kp": (0.01, replace(self, kp_per_s=1.01 * self.kp_per_s)),
+            "kd": (0.01, replace(self, kd_per_s=1.01 * self.kd_per_s)),
+            "delay_s": (0.05, replace(self, delay_s=0.05)),
+        }
+        found = {
+            name: (response(other, v, times, data, torque) - here) / step for name, (step, other) in changes.items()
+        }
+        return found | {"inertia": np.where(stored, 0.0, -here), "spin_inertia": np.where(stored, here, 0.0)}
+
+    def measured(self, v: LoopLevels) -> tuple[np.ndarray, np.ndarray]:
+        H = np.zeros((len(ROWS), _STATES))
+        H[ATTITUDE_ERROR, [_ATTITUDE, _ERROR]] = -1
+        H[BODY_RATE, _RATE] = 1
+        H[MOMENTUM, _STORED] = self.inertia_kgm2
+        return H, np.array([v.error_white_rad, v.rate_white_rad_s, v.momentum_white_Nms, np.inf])
+
+    def start(self, v: LoopLevels, times: Times) -> np.ndarray:
+        turning = 3 * times.largest[BODY_RATE] + 1e-5
+        stored = 3 * times.largest[MOMENTUM] / self.inertia_kgm2 + turning  # the first sample may be a bad one
+        return np.array([3 * times.largest[ATTITUDE_ERROR] + 1e-4, *[turning] * 5, stored, v.error_slow_rad])
+
+    def starting_levels(self, series) -> LoopLevels:
+        by_row = {s.row: s for s in series}
+        h = by_row[MOMENTUM]
+        push = max(usual_size(np.gradient(h.values, h.seconds)), 1e-7)
+        white = white_noise(by_row[ATTITUDE_ERROR], 1e-9)
+        return LoopLevels(
+            torque_Nm=push,
+            length_s=15.0,
+            rate_white_rad_s=white_noise(by_row[BODY_RATE], 1e-10),
+            momentum_white_Nms=white_noise(h, 1e-6),
+            error_white_rad=white,
+            error_slow_rad=1.5 * white,
+            error_time_s=15.0,
+            reaction_Nm_sqrt_s=max(0.05 * push, 1e-6),
+        )

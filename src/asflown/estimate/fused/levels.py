@@ -1,0 +1,181 @@
+"""Levels of largest posterior on one axis: sizes, times and noises, outliers, and clocks that disagree.
+
+Marginal likelihood of all samples under the smooth (Matern) torque, with weak log-normal priors that keep
+what the data say nothing about near where the channels themselves put it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import optimize
+
+from ...kit.smoother import Measurements, log_likelihood, smooth
+from .body import Body, Known, Levels, without_known
+from .series import ROWS, Series, Times, arrange, channel_of, step_of
+
+#: A sample that all the others contradict by more than this is left out; the most that may be. [sigma]
+OUTLYING, _MOST_OUTLYING = 5.0, 0.1
+#: A bad sample makes its neighbours look bad: of those this close only the worst is left out at a time. [s]
+_NEIGHBOURS_S = 20.0
+#: An offset between channels is corrected when it is this sure, and this large. [sigma], [s]
+_SURE, _WORTH_S = 4.0, 0.2
+#: Furthest offset looked for. [s]
+_REACH_S = 3.0
+#: Samples of a long record that the levels are fitted to, in blocks spread evenly over it.
+_MOST_FITTED, _BLOCKS = 9000, 3
+
+
+@dataclass(frozen=True)
+class Offset:
+    """By how much a channel's times are late against the actuators', from the likelihood's profile."""
+
+    seconds: float
+    sigma: float
+    corrected: bool
+
+
+@dataclass(frozen=True)
+class AxisFit:
+    """What was fitted on one axis."""
+
+    levels: Levels
+    series: tuple[Series, ...]  # without outliers, offsets corrected
+    left_out: int
+    offsets: dict[str, Offset]
+
+
+def fit_levels(body: Body, series: list[Series], known: Known | None = None) -> AxisFit:
+    """Fit one axis; samples that all the others contradict are left out, clocks that surely disagree are set, and
+    the fit is repeated.  ``known``: a torque to take off before."""
+    centre = body.starting_levels(series)
+    count = sum(len(s.values) for s in series)
+    # levels not yet fitted: only what no level would explain
+    cleaned = _without_outliers(body, centre, series, known, 2 * OUTLYING)
+    if cleaned is not series:
+        series, centre = cleaned, body.starting_levels(cleaned)
+    levels = _most_probable(body, centre, centre, series, known)
+    cleaned = _without_outliers(body, levels, series, known, OUTLYING)
+    offsets = _offsets(body, levels, cleaned, known)
+    late = {row: offsets[n].seconds for row, n in enumerate(ROWS) if n in offsets and offsets[n].corrected}
+    if late or cleaned is not series:
+        series = [s.later(-late.get(s.row, 0.0)) for s in cleaned]
+        levels = _most_probable(body, centre, levels, series, known)
+        series = _without_outliers(body, levels, series, known, OUTLYING)
+    return AxisFit(levels, tuple(series), count - sum(len(s.values) for s in series), offsets)
+
+
+def _without_outliers(body: Body, levels: Levels, series, known: Known | None, limit: float):
+    """The series less what lies beyond ``limit``, worst first; as they are where there is nothing, or too much."""
+    kept, most = series, _MOST_OUTLYING * sum(len(s.values) for s in series)
+    left_out = 0
+    while True:
+        times, data = arrange(kept)
+        data = without_known(body, levels, times, data, known)
+        alone = np.abs(np.nan_to_num(smooth(body.smooth_model(levels, times), data).alone))
+        worst = _worst(alone, times.seconds[step_of(data)], limit)
+        left_out += len(worst)
+        if left_out > most:
+            return series
+        if not len(worst):
+            return kept
+        kept = _without(kept, times, data, worst)
+
+
+def _worst(alone: np.ndarray, at_s: np.ndarray, limit: float) -> np.ndarray:
+    """Measurements beyond the limit, none near a worse one."""
+    chosen: list[int] = []
+    for i in np.flatnonzero(alone > limit)[np.argsort(-alone[alone > limit])]:
+        if all(abs(at_s[i] - at_s[c]) > _NEIGHBOURS_S for c in chosen):
+            chosen.append(int(i))
+    return np.array(chosen, int)
+
+
+def _most_probable(body: Body, centre: Levels, start: Levels, series, known: Known | None) -> Levels:
+    kind, middle, spread = type(centre), centre.logs(), np.array(body.SPREAD)
+    blocks = [arrange(part) for part in _blocks(series)]
+    blocks = [(times, without_known(body, start, times, data, known)) for times, data in blocks]
+
+    def cost(p):
+        levels = kind.from_logs(p)
+        value = sum(log_likelihood(body.smooth_model(levels, times), data) for times, data in blocks)
+        return (-value if np.isfinite(value) else 1e10) + 0.5 * np.sum(((p - middle) / spread) ** 2)
+
+    bounds = list(zip(middle - 4 * spread, middle + 4 * spread, strict=True))
+    p = start.logs()
+    for step in body.SEARCH:
+        p = optimize.minimize(cost, p, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60, "eps": step}).x
+    return kind.from_logs(p)
+
+
+def _blocks(series) -> list[list[Series]]:
+    """The whole record, or stretches of equal length spread over a long one."""
+    count = sum(len(s.values) for s in series)
+    if count <= _MOST_FITTED:
+        return [list(series)]
+    first, last = min(s.seconds[0] for s in series), max(s.seconds[-1] for s in series)
+    length = (last - first) * _MOST_FITTED / _BLOCKS / count
+    starts = np.linspace(first, last - length, _BLOCKS)
+    parts = [[s.between(a, a + length) for s in series] for a in starts]
+    return [p for p in parts if all(len(s.values) > 2 for s in p)] or [list(series)]
+
+
+def _offsets(body: Body, levels: Levels, series, known: Known | None) -> dict[str, Offset]:
+    """Each channel against the actuators', by the curvature of the likelihood along the shift; two rounds."""
+    series = _blocks(series)[0]
+    lead = max(series, key=lambda s: s.row)
+    shifts = {s.row: 0.0 for s in series if s is not lead}
+    sigmas: dict[int, float] = {}
+
+    def cost(row: int, shift: float) -> float:
+        moved = [s.later(-(shift if s.row == row else shifts.get(s.row, 0.0))) for s in series]
+        times, data = arrange(moved)
+        data = without_known(body, levels, times, data, known)
+        return -log_likelihood(body.smooth_model(levels, times), data)
+
+    for _ in range(2):
+        for row in shifts:
+            h = 0.1
+            centre = shifts[row]
+            for _ in range(4):  # Newton's steps on a parabola through three points
+                left, here, right = (cost(row, centre + d) for d in (-h, 0.0, h))
+                bend = (left - 2 * here + right) / h**2
+                if not bend > 0:
+                    break
+                step = float(np.clip((left - right) / (2 * h * bend), -0.5, 0.5))
+                centre = float(np.clip(centre + step, -_REACH_S, _REACH_S))
+                sigmas[row] = float(1 / np.sqrt(bend))
+                if abs(step) < 0.02:
+                    break
+            shifts[row] = centre
+    found = {}
+    for row, sigma in sigmas.items():
+        t = shifts[row]
+        sure = abs(t) > _SURE * sigma and abs(t) > _WORTH_S and abs(t) < _REACH_S
+        found[ROWS[row]] = Offset(t, sigma, bool(sure))
+    return found
+
+
+def _without(series, times: Times, data: Measurements, bad: np.ndarray) -> list[Series]:
+    step, row = step_of(data), channel_of(times, data)
+    kept = []
+    for s in series:
+        drop = times.seconds[step[bad[row[bad] == s.row]]]
+        keep = ~np.isin(np.round(s.seconds * 1e3), np.round(drop * 1e3))
+        kept.append(s.where(keep))
+    return kept
+
+
+def fit_doubts(axis: str, fit: AxisFit) -> list[str]:
+    """What one axis's fit leaves to doubt."""
+    doubts = []
+    for channel, o in fit.offsets.items():
+        if o.corrected:
+            doubts.append(
+                f"{channel} about {axis} is {abs(o.seconds):.2f} +- {o.sigma:.2f} s {'late' if o.seconds > 0 else 'early'} against "
+                "the actuators' telemetry: its times are shifted by that; check the time stamps"
+            )
+    if fit.left_out:
+        doubts.append(f"{fit.left_out} samples about {axis} lie beyond {OUTLYING:g} sigma and are left out")
+    return doubts

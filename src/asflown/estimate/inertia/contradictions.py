@@ -1,0 +1,136 @@
+"""What may be wrong where momentum is not conserved: the mistakes that telemetry is known for, tried one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations, pairwise
+
+import numpy as np
+from scipy import ndimage
+
+from ...dynamics.rigid_body import tensor_of
+from ...kit.errors import BadInput
+from ...kit.regression import memory
+from ...kit.rotations import rotation
+from ...telemetry.attitude import MISTAKEN_UNITS
+from .motion import Layout, first_motion
+from .plain import plain_fit
+from .record import SlewRecord
+from .slews import Slew
+
+#: Momentum left over, as a share of what the wheels' varies by, from which mistakes are looked for.
+_TOO_MUCH = 0.02
+#: A step of momentum is plain where it takes this much off the squared residuals, in their own variance.
+_STEP_SEEN = 60.0
+MOST_STEPS = 5
+#: A mistake is named where mending it takes away this much of what is left over (rms).
+_MENDED = 5.0
+
+
+def conserved(record: SlewRecord, slews: list[Slew], source: str | None) -> tuple[SlewRecord, list[float], bool]:
+    """The record, its arcs parted where the momentum plainly steps (when, seconds of the record), and whether its momentum
+    is conserved then.
+
+    Raises BadInput, naming the likeliest mistake, where another reading of the data conserves it far better.  Tried: the
+    quaternion in the other direction, rates in another unit where no attitude shows it, one wheel turning the other
+    way, two wheels mistaken for each other, in all of the record or after one of its slews."""
+    layout = Layout.of(record)
+    left = plain_fit(record, layout, np.zeros(layout.size), 0.0)[1]
+    limit = _TOO_MUCH**2 * _variance(record) * len(record.momentum.time_s)
+    if left <= limit:
+        return record, [], True
+    tried = {what: plain_fit(other, layout, np.zeros(layout.size), 0.0)[1] for what, other in _others(record, slews)}
+    best = min(tried, key=lambda w: tried[w], default=None)
+    if best is not None and tried[best] * _MENDED**2 < left:
+        raise BadInput(
+            f"momentum is not conserved, and would be {np.sqrt(left / max(tried[best], 1e-300)):.0f} times better if {best}",
+            file=source,
+            remedy="Mend the column names and units, the craft's wheel axes or the quaternion's direction, or leave the span out "
+            "(--start, --stop).",
+        )
+    parted = record
+    steps: list[float] = []
+    while len(steps) < MOST_STEPS:
+        at = _step_of_momentum(*_residual(parted))
+        if at is None:
+            break
+        parted, steps = parted.split_at(at), [*steps, at]
+        layout = Layout.of(parted)
+        if plain_fit(parted, layout, np.zeros(layout.size), 0.0)[1] <= limit:
+            return parted, steps, True
+    return record, [], False
+
+
+def _variance(record: SlewRecord) -> float:
+    """Of one component of the wheels' momentum."""
+    m = record.momentum
+    return float(np.mean([np.var(m.value_Nms[(m.direction == d).all(axis=1)]) for d in np.unique(m.direction, axis=0)]))
+
+
+def _residual(record: SlewRecord):
+    """What plain least squares leaves over: time (N,), momentum (N, 3), inertial axes, and arc (N,)."""
+    layout, m = Layout.of(record), record.momentum
+    beta, _ = plain_fit(record, layout, np.zeros(layout.size), 0.0)
+    times, held, index = m.vectors(m.value_Nms)
+    motion = first_motion(record, times)
+    r = rotation(motion.q_NB)
+    arc = np.zeros(len(times), int)
+    arc[index] = m.arc
+    starts = beta[6 : 6 + 3 * layout.arcs].reshape(layout.arcs, 3)
+    return times, r.apply(held + motion.omega_B @ tensor_of(beta[layout.TENSOR])) - starts[arc], arc
+
+
+def _step_of_momentum(time_s: np.ndarray, residual_N: np.ndarray, arc: np.ndarray) -> float | None:
+    """Where one step would take most off a residual momentum (N, 3), inertial axes, if it is plain. [s]"""
+    quick = residual_N - ndimage.median_filter(residual_N, size=(31, 1), mode="nearest")  # without the step itself
+    noise = np.sqrt(max(memory(column) for column in quick.T))  # neighbours that err alike are worth less
+    noise *= 1.4826 * np.median(np.abs(quick))
+    best, at = _STEP_SEEN, None
+    for k in np.unique(arc):
+        here = np.flatnonzero(arc == k)
+        n = len(here)
+        if n < 20:
+            continue
+        total = np.cumsum(residual_N[here], axis=0)[9:-10]
+        before = np.arange(10, n - 9)[:, None]
+        mean = residual_N[here].mean(axis=0)
+        gain = np.sum((total - before * mean) ** 2 / (before * (n - before) / n), axis=1) / max(noise, 1e-300) ** 2
+        if gain.max() > best:
+            j = int(np.argmax(gain)) + 10
+            best, at = float(gain.max()), float(0.5 * (time_s[here[j - 1]] + time_s[here[j]]))
+    return at
+
+
+def _others(record: SlewRecord, slews: list[Slew]) -> Iterator[tuple[str, SlewRecord]]:
+    if record.has_attitude:
+        turned = record.attitude.q_NB * np.array([1.0, -1.0, -1.0, -1.0])
+        yield "the quaternion were its conjugate", replace(record, attitude=replace(record.attitude, q_NB=turned))
+    else:
+        for factor, unit in MISTAKEN_UNITS.items():
+            rates = replace(record.rates, value_rad_s=record.rates.value_rad_s / factor)
+            yield f"the body rates were {unit}", replace(record, rates=rates)
+    if len(record.axes) != 3 or abs(np.linalg.det(record.axes)) < 1e-9 * np.abs(record.axes).max() ** 3:
+        return
+    times = [None, *[0.5 * (a.stop_s + b.start_s) for a, b in pairwise(slews)]]
+    for after in times:
+        when = "" if after is None else f" from {after:.0f} s of the record on"
+        for k, name in enumerate(record.wheels):
+            flipped = record.axes.copy()
+            flipped[k] *= -1
+            yield f"wheel {name} turned the other way{when}", _read_as(record, flipped, after)
+        for i, j in combinations(range(3), 2):
+            swapped = record.axes.copy()
+            swapped[[i, j]] = swapped[[j, i]]
+            what = f"wheels {record.wheels[i]} and {record.wheels[j]} were mistaken for each other{when}"
+            yield what, _read_as(record, swapped, after)
+
+
+def _read_as(record: SlewRecord, axes: np.ndarray, after: float | None) -> SlewRecord:
+    """The same readings, the wheels' momentum along other axes (3, 3)."""
+    m = record.momentum
+    _, h, index = m.vectors(m.value_Nms)
+    other = h @ np.linalg.inv(record.axes) @ axes
+    late = np.ones(len(index), bool) if after is None else m.time_s > after
+    value = np.where(late, np.sum(m.direction * other[index], axis=1), m.value_Nms)
+    return replace(record, momentum=replace(m, value_Nms=value))

@@ -1,0 +1,38 @@
+"""Which channels tell what the actuators hold or give."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...kit.errors import BadInput
+from ...telemetry.channels import AXES
+from .subject import Subject
+
+
+def actuators(subject: Subject):
+    """What holds momentum: [(channel, momentum per unit)], or the control torque channels, and doubts."""
+    tlm = subject.telemetry
+    if tlm.members("wheel_rate"):
+        pairs = subject.wheels()
+        axes, spin = axes_and_inertias(pairs)
+        return [(c, J * a) for (c, _), a, J in zip(pairs, axes, spin, strict=True)], [], []
+    if tlm.has_axes("wheel_momentum"):
+        return [(tlm.channel(f"wheel_momentum_{a}"), np.eye(3)[j]) for j, a in enumerate(AXES)], [], []
+    if tlm.has_axes("control_torque"):
+        doubt = (
+            "only the commanded control torque is telemetered: it is taken as delivered, and momentum_Nms is the body's alone, "
+            "without what the actuators hold"
+        )
+        return [], [tlm.channel(f"control_torque_{a}") for a in AXES], [doubt]
+    subject.wheels()  # names what is missing
+    raise BadInput(
+        "neither wheel rates, wheel momentum nor control torque are in the telemetry",
+        file=tlm.source or None,
+        remedy="The momentum method needs wheel_rate_<WHEEL>, wheel_momentum_x|y|z or control_torque_x|y|z.",
+    )
+
+
+def axes_and_inertias(pairs):
+    axes = np.array([w.axis for _, w in pairs])
+    spin = np.array([1.0 if w.spin_inertia is None else w.spin_inertia for _, w in pairs])
+    return axes, spin

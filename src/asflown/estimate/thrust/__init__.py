@@ -1,0 +1,8 @@
+"""Thrust as flown, fall time and centre of mass, from wheel biasing, run-downs and burns."""
+
+from .methods import thrust
+from .result import EventSeen, ThrustResult
+
+__all__ = [
+    "EventSeen", "ThrustResult", "thrust",
+]  # fmt: skip

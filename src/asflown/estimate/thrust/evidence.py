@@ -1,0 +1,59 @@
+"""What the results of all methods share: on-times, pulses and R, and what a record showed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...craft.model import Craft
+from ...dynamics.pulses import Valve, expected_effective
+from ...kit.timeline import utc_label
+from ...telemetry.telemetry import Telemetry, file_name
+from ..firing import Counters, Firings
+from .result import EventSeen
+
+
+def pulse_ratios(counters: list[Counters], which, step_s: float, valve: Valve) -> dict[str, float]:
+    """R of all pulses of the thrusters ``which``, by both formulas."""
+    on, n = (np.concatenate([np.diff(v[:, which], axis=0) for v in (getattr(c, key) for c in counters)])
+             for key in ("on_time_s", "pulses"))  # fmt: skip
+    return {v: float(expected_effective(on, n, step_s, valve, v).sum() / on.sum()) for v in ("printed", "corrected")}
+
+
+def common_of(records: list[Firings], craft: Craft, first: Telemetry, valve: Valve) -> dict:
+    names = records[0].names
+    fired = np.flatnonzero(np.sum([f.total_on_time_s for f in records], axis=0) > 0)
+    return {
+        "craft": craft.name,
+        "epoch": first.epoch_label,
+        "names": names,
+        "pulse_ratio": pulse_ratios([f.counters for f in records], fired, records[0].step_s, valve),
+        "on_time_s": {n: float(sum(f.total_on_time_s[k] for f in records)) for k, n in enumerate(names)},
+        "pulses": {n: float(sum(f.total_pulses[k] for f in records)) for k, n in enumerate(names)},
+        "pulses_counted": all(f.counters.counted for f in records),
+    }
+
+
+def doubts_of(records: list[Firings]) -> list[str]:
+    if len(records) == 1:
+        return list(records[0].doubts)
+    return [f"{f.telemetry.source or f'record {k}'}: {d}" for k, f in enumerate(records, 1) for d in f.doubts]
+
+
+def event_seen(f: Firings, left, number: int) -> EventSeen:
+    """``left`` (K, 3): the momentum's steps less the fit, or None where nothing was fitted to them."""
+    tlm = f.telemetry
+    wheels = {c.member: c.usable for c, _ in f.subject.wheels()} if tlm.members("wheel_rate") else {}
+    base = next(iter(wheels.values()), None)
+    t = np.empty(0) if base is None else tlm.seconds(base.tai_ns)
+    steps = np.diff(f.in_space, axis=0)
+    label = file_name(tlm.source) if tlm.source else f"record {number}"
+    return EventSeen(
+        label=f"{label}, {utc_label(tlm.epoch_ns)[:10]}" if tlm.dated else label,
+        wheel_time_s=t,
+        wheel_rate_rad_s={n: np.interp(t, tlm.seconds(c.tai_ns), c.values) for n, c in wheels.items()},
+        counter_time_s=tlm.seconds(f.counters.tai_ns),
+        on_time_s=f.counters.on_time_s,
+        time_s=tlm.seconds(f.tai_ns[1:]),
+        gained=np.cumsum(steps, axis=0),
+        left=None if left is None else np.cumsum(left, axis=0),
+    )

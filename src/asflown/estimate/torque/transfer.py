@@ -1,0 +1,213 @@
+"""Disturbance torque from attitude error, through the inverse of the closed loop (000 section IV).
+
+    T = -I (e'' + KD F(e') + KP KD e)                      full: the exact inverse of 000 eq 11
+    T = -I (e'' + KD e' + KP KD e)                         low: 000 eq 16, 004 eq 6
+    T = -(I/g) (e'' + d e' + k e)                          hankel: the way of 004 eqs 9, 10
+
+F is the rate filter: the sixth-order loop has an inverse that is no harder than the low-order one,
+with the rate filtered.  e is commanded minus estimated attitude in a hold, so the body rate is -e'.
+
+``printed`` is the paper's way: e splined to 1 s, smoothed over 8 % of the record, differenced forward
+twice (eqs 18, 19), low-order inverse.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from ...craft.model import WheelController
+from ...dynamics.loop import SecondOrder, filtered_rate, hankel_order_two, low_order
+from ...kit.errors import BadInput, some_of
+from ...kit.regression import LocalFit, local_polynomial
+from ...kit.timeline import NS, runs
+from ...telemetry.channels import AXES
+from ..subject import Grid, Subject, fit_on_grid, gap_doubts, gaps_on_grid, grid_for, splined
+from .momentum import HALF_WIDTH_S, smoothed_as_printed
+
+MODELS = ("low", "hankel", "full")
+
+#: Half-width of the local cubic through attitude error, chosen by studies/error_window.py. [s]
+ERROR_HALF_WIDTH_S = 18.0
+
+_RATE_OF_A_SLEW = 5e-4  # rad/s: above it the record is no hold
+
+
+def printed(subject: Subject, model: str = "low"):
+    """The paper's way. Returns grid, torque (M, 3), None, None, settings, doubts; NaN for axes without e."""
+    I_B = subject.known_inertia()
+    inverse = _second_order(subject, model)
+    channels = _errors(subject)
+    grid = grid_for(list(channels.values()), step_s=1.0)
+    torque = np.full((grid.count - 2, 3), np.nan)
+    span = 0
+    for j, channel in channels.items():
+        smooth, span = smoothed_as_printed(splined(channel, grid)[:, None])
+        e = smooth[:, 0]
+        rate = np.diff(e)
+        torque[:, j] = (
+            -I_B[j, j]
+            / inverse.gain
+            * (np.diff(rate) + inverse.damping_per_s * rate[:-1] + inverse.stiffness_per_s2 * e[:-2])
+        )
+    doubts = [
+        f"printed method: smoothing over 8 % of the record ({span} s here) takes 10-15 % off pulses of 30 s, 20-27 % off "
+        "pulses of 15 s, and half of those of 7-10 s"
+    ]
+    doubts += gap_doubts(subject.telemetry, grid, {g: c.name for c in channels.values() for g in gaps_on_grid(c, grid)})
+    return Grid(grid.start_ns, 1.0, grid.count - 2), torque, None, None, {"span_samples": span, "model": model}, doubts
+
+
+def corrected(subject: Subject, model: str = "full", window_s: float | None = None):
+    """Attitude error smoothed once by local cubics, the chosen inverse applied, w x h added where the wheels are known.
+
+    Smoothed once, because value, slope and curvature of one local fit have each their own bandwidth:
+    an inverse put together from them is late by up to 2 s on 10-s excursions.  The rate error is taken
+    from telemetry where it is there: controller_rate_error (000 eq 17, 004 eq 8), which has already gone
+    through the filter, or rate_error.  Returns as ``printed``, with sigma (M, 3)."""
+    I_B = subject.known_inertia()
+    tlm, k = subject.telemetry, subject.controller()
+    width = ERROR_HALF_WIDTH_S if window_s is None else window_s / 2
+    channels = _errors(subject)
+    rate_channels = {j: _rate_channel(tlm, AXES[j]) for j in channels}
+    grid = grid_for([*channels.values(), *[c for c in rate_channels.values() if c is not None]])
+    inverse = None if model == "full" else _second_order(subject, model)
+    acceleration, push, rate = np.full((3, grid.count, 3), np.nan)
+    variance = np.full((grid.count, 3), np.nan)
+    silent: dict[tuple[float, float], str] = {}
+    for j, channel in channels.items():
+        f = fit_on_grid(channel, grid, degree=3, half_width_s=width)
+        silent |= {g: channel.name for g in f.gaps}
+        told, extra = None, 0.0
+        if rate_channels[j] is not None:
+            r = fit_on_grid(rate_channels[j], grid, degree=3, half_width_s=width)
+            silent |= {g: rate_channels[j].name for g in r.gaps}
+            told, extra = r.fit.value, k.kd_per_s**2 * r.variance([1, 0, 0])
+        stride = max(1, round(channel.cadence_ns / NS / grid.step_s))
+        loop = _Inverse(k, inverse, grid.step_s, stride, None if told is None else rate_channels[j].kind.stem)
+        acceleration[:, j], push[:, j], rate[:, j] = loop.apply(f.fit.value, told)
+        stiff = k.kp_per_s * k.kd_per_s
+        widened = f.widened @ np.square([stiff, k.kd_per_s, 1.0])
+        variance[:, j] = I_B[j, j] ** 2 * (_noise_gain(loop, channel, grid, width, f) * f.sigma**2 + widened + extra)
+    gain = 1.0 if inverse is None else inverse.gain
+    if len(channels) == 3 and inverse is None:
+        torque = -(acceleration @ I_B + push * np.diag(I_B))
+    else:
+        torque = -np.diag(I_B) / gain * (acceleration + push)
+    if len(channels) == 3 and tlm.members("wheel_rate") and not subject.relative:
+        torque += np.cross(-rate, _wheel_momentum(subject, grid))  # in a hold the body turns at -e'
+    doubts = gap_doubts(tlm, grid, silent)
+    if np.nanmax(np.abs(rate)) > _RATE_OF_A_SLEW or _turning(tlm):
+        doubts.append(
+            "the attitude is not held still: the transfer method assumes a hold, and commanded rates and accelerations are "
+            "not in the telemetry"
+        )
+    doubts.append(
+        "the band of the transfer method holds independent noise only: slow (coloured) attitude-estimate error is not in it"
+    )
+    return grid, torque, np.sqrt(variance) / gain, None, {"half_width_s": width, "degree": 3, "model": model}, doubts
+
+
+@dataclass(frozen=True)
+class _Inverse:
+    """The inverse of the loop as a linear operator on smoothed attitude error, stretch by stretch.
+
+    ``stride``: instants between samples.  The curve to differentiate goes through instants of one phase
+    to the samples only: a local fit's noise depends on that phase, and a curve through all of them
+    would ripple.  ``rate_channel``: None (differentiate e), 'rate_error' or 'controller_rate_error'."""
+
+    controller: WheelController
+    second_order: SecondOrder | None
+    step_s: float
+    stride: int = 1
+    rate_channel: str | None = None
+
+    def apply(self, e: np.ndarray, told: np.ndarray | None = None):
+        """e'', the rest of the bracket, and e'; NaN where e is."""
+        out = np.full((3, len(e)), np.nan)
+        known = np.isfinite(e) & (True if told is None else np.isfinite(told))
+        for s in runs(known):
+            if s.stop - s.start >= 8 * self.stride:
+                out[:, s] = self._stretch(e[s], None if told is None else told[s])
+        return out
+
+    def _stretch(self, e, told):
+        k = self.controller
+        at = self.step_s * np.arange(len(e))
+        nodes = np.arange(0, len(e), self.stride)
+        if nodes[-1] != len(e) - 1:
+            nodes = np.append(nodes, len(e) - 1)
+        curve = make_interp_spline(at[nodes], e[nodes], 5)
+        e, rate, acceleration = curve(at), curve(at, 1), curve(at, 2)
+        if self.rate_channel == "controller_rate_error":  # F(e') + KP e
+            filtered, rate = told - k.kp_per_s * e, told - k.kp_per_s * e
+        else:
+            rate = rate if told is None else told
+            filtered = filtered_rate(k, rate, self.step_s) if self.second_order is None else rate
+        s = self.second_order or low_order(k)
+        return acceleration, s.damping_per_s * filtered + s.stiffness_per_s2 * e, rate
+
+
+def _noise_gain(loop: _Inverse, channel, grid: Grid, half_width_s: float, f) -> np.ndarray:
+    """Variance of the inverse's bracket per unit noise variance of one attitude-error sample. (M,)
+
+    From the answer to single samples of unit size in mid-record; towards the ends it grows as the
+    curvature's variance does, which rules the bracket."""
+    c = channel.usable
+    cadence = c.cadence_ns / NS
+    reach = 3 * half_width_s + 10 * grid.step_s
+    n = int(2 * reach / cadence) + 1
+    at = np.arange(0, (n - 1) * cadence, grid.step_s)
+    squares = []
+    for k in range(n // 2, n // 2 + 2):
+        impulse = np.zeros(n)
+        impulse[k] = 1.0
+        smooth = local_polynomial(cadence * np.arange(n), impulse, at, degree=3, half_width=half_width_s).value
+        acceleration, push, _ = loop.apply(smooth, None if loop.rate_channel is None else np.zeros_like(smooth))
+        squares.append(np.sum((acceleration + push) ** 2))
+    curvature = f.fit.gain[:, 2, 2]
+    return np.mean(squares) * grid.step_s / cadence * np.maximum(1.0, curvature / np.nanmedian(curvature))
+
+
+def _errors(subject: Subject) -> dict:
+    """Axis index -> attitude error channel."""
+    tlm = subject.telemetry
+    channels = {j: tlm.channel(f"attitude_error_{a}") for j, a in enumerate(AXES) if f"attitude_error_{a}" in tlm}
+    if not channels:
+        tlm.channel("attitude_error_y")  # names what is missing
+    return channels
+
+
+def _second_order(subject: Subject, model: str):
+    k = subject.controller()
+    if model == "low":
+        return low_order(k)
+    if model == "hankel":
+        return hankel_order_two(k)
+    raise BadInput(
+        f"model {model!r} is not known here", remedy=f"Choose one of {some_of(MODELS)} (printed: low or hankel)."
+    )
+
+
+def _rate_channel(tlm, axis: str):
+    for stem in ("controller_rate_error", "rate_error"):
+        if f"{stem}_{axis}" in tlm:
+            return tlm.channel(f"{stem}_{axis}")
+    return None
+
+
+def _wheel_momentum(subject: Subject, grid: Grid) -> np.ndarray:
+    h = np.zeros((grid.count, 3))
+    for channel, wheel in subject.wheels():
+        f: LocalFit = fit_on_grid(channel, grid, degree=3, half_width_s=HALF_WIDTH_S).fit
+        known = np.isfinite(f.value)  # beyond its ends and in its gaps: it changes slowly, and w is small
+        value = np.interp(grid.seconds, grid.seconds[known], f.value[known])
+        h += np.outer(value, wheel.spin_inertia * np.asarray(wheel.axis))
+    return h
+
+
+def _turning(tlm) -> bool:
+    rates = [tlm.channel(f"body_rate_{a}").usable.values for a in AXES if f"body_rate_{a}" in tlm]
+    return any(len(r) and np.percentile(np.abs(r), 90) > _RATE_OF_A_SLEW / 5 for r in rates)

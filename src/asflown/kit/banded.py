@@ -1,0 +1,33 @@
+"""Covariances with a band of correlation: each step shares its noise with its neighbours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_solve_banded, cholesky_banded
+
+
+@dataclass(frozen=True)
+class Covariance:
+    """Block tridiagonal, factored once."""
+
+    factor: np.ndarray
+    variance: np.ndarray  # (K d,)
+
+    @classmethod
+    def of(cls, main, off) -> Covariance:
+        """main (K, d, d), off (K - 1, d, d): blocks beside the diagonal, symmetric."""
+        K, d, _ = main.shape
+        full = np.zeros((2 * d, K * d))  # lower form: full[i - j, j] = C[i, j]
+        for r in range(d):
+            for c in range(d):
+                if r >= c:
+                    full[r - c, c::d] = main[:, r, c]
+                full[d + r - c, c : (K - 1) * d : d] = off[:, r, c]
+        factor = cholesky_banded(full, lower=True)
+        return cls(factor, full[0].copy())
+
+    def solve(self, columns) -> np.ndarray:
+        """C^-1 times columns (K d, m)."""
+        return cho_solve_banded((self.factor, True), columns)

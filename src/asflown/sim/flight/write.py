@@ -1,0 +1,120 @@
+"""A flight on disk: the telemetry a spacecraft would send, and the truth beside it."""
+
+from __future__ import annotations
+
+import json
+import platform
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from ...kit.files import write_text
+from ...kit.timeline import utc_label
+from ...telemetry.channels import AXES
+from ...telemetry.tables import write_table
+
+
+def write_flight(flight, directory: str | Path) -> dict[str, Path]:
+    """telemetry.csv, truth.csv and truth.json in ``directory``; returns their paths by name.
+
+    Each file appears whole or not at all.  Raises BadInput where the directory cannot be written."""
+    folder = Path(directory)
+    files = {"telemetry": folder / "telemetry.csv", "truth": folder / "truth.csv", "truth_json": folder / "truth.json"}
+    write_text(files["truth"], truth_table(flight))  # makes the directory
+    write_table(flight.telemetry, files["telemetry"])
+    write_text(files["truth_json"], json.dumps(truth_record(flight), indent=1, allow_nan=False) + "\n")
+    return files
+
+
+def truth_table(flight) -> str:
+    """What really happened at every control instant, as CSV; torques on the body, in body axes."""
+    truth = flight.truth
+    columns = {"time [s]": truth.time_s}
+
+    def add(stem: str, unit: str, values, members) -> None:
+        columns.update({f"{stem}_{m} [{unit}]": values[:, i] for i, m in enumerate(members)})
+
+    add("disturbance_torque", "N m", truth.torque_Nm, AXES)
+    add("body_rate", "rad/s", truth.body_rate_rad_s, AXES)
+    add("wheel_rate", "rad/s", truth.wheel_rate_rad_s, flight.wheels)
+    add("quaternion", "", truth.attitude, ("w", *AXES))
+    add("wheel_momentum", "N m s", truth.wheel_momentum_Nms, AXES)
+    add("momentum_inertial", "N m s", truth.momentum_inertial_Nms, AXES)
+    add("control_torque", "N m", truth.control_torque_Nm, AXES)
+    add("estimation_error", "rad", truth.estimation_error_rad, AXES)
+    if flight.scenario.coasts:
+        add("holding_torque", "N m", truth.holding_torque_Nm, AXES)
+    if truth.thrusters is not None:
+        add("thrust", "N", truth.thrusters.thrust_N, truth.thrusters.names)
+        add("impulse", "N s", truth.thrusters.impulse_Ns, truth.thrusters.names)
+        add("linear_impulse_inertial", "N s", truth.thrusters.linear_impulse_Ns(truth.attitude), AXES)
+    if truth.density_kgm3 is not None:
+        columns |= {"density [kg/m3]": truth.density_kgm3, "altitude [m]": truth.altitude_m}
+    if truth.cover_angle_rad is not None:
+        columns["cover_angle [rad]"] = truth.cover_angle_rad
+    head = [
+        f"# truth of scenario {flight.scenario.name}, seed {flight.seed}; {flight.ended}",
+        f"# epoch: {flight.telemetry.epoch_label}",
+        "# torques act on the body, body axes; quaternion scalar first, body to inertial; momentum_inertial is of everything",
+        ",".join(columns),
+    ]
+    rows = np.column_stack(list(columns.values())).tolist()
+    return "\n".join(head + [",".join(map(repr, row)) for row in rows]) + "\n"
+
+
+def truth_record(flight) -> dict:
+    """What was flown: enough to fly it again, and to judge an estimate."""
+    scenario, truth = flight.scenario, flight.truth
+    return {
+        "scenario": scenario.name,
+        "description": scenario.description,
+        "craft": flight.craft.name,
+        "epoch": f"{utc_label(scenario.epoch_ns)} UTC",
+        "seed": flight.seed,
+        "noise": scenario.noise,
+        "ended": flight.ended,
+        "inertia_kg_m2": np.asarray(flight.inertia_kgm2).tolist(),
+        "controller_inertia_kg_m2": None if scenario.controller.inertia is None else list(scenario.controller.inertia),
+        "wheels": list(flight.wheels),
+        "torque_profile": [source.model_dump() for source in scenario.torques],
+        "coasts": [c.model_dump() for c in scenario.coasts],
+        "drag_spikes": [d.model_dump() for d in scenario.drag_spikes],
+        "wheel_drag": _drag_of(flight),
+        "thrusters": None if truth.thrusters is None else _thrusters_of(flight),
+        "flyby": None if flight.met is None else flight.met.record(),
+        "peaks": [{"time_s": t, "torque_Nm": T, "axis": a} for t, T, a in truth.peaks],
+        "assumptions": list(scenario.assumptions),
+        "doubts": list(flight.doubts),
+        "as_written": scenario.as_written,
+        "versions": {"python": platform.python_version()}
+        | {p: version(p) for p in ("asflown", "numpy", "scipy", "numba")},
+    }
+
+
+def _thrusters_of(flight) -> dict:
+    """What each thruster is and did; pulses are start, on-time and the thrust they rise to."""
+    truth, fired = flight.truth, flight.truth.thrusters
+    return {
+        name: {
+            "arm_m": fired.arms_m[k].tolist(),
+            "direction": fired.directions[k].tolist(),
+            "delay_s": fired.delay_s[k],
+            "rise_hot_cold_s": fired.rise_s[:, k].tolist(),
+            "fall_hot_cold_s": fired.fall_s[:, k].tolist(),
+            "on_time_s": fired.on_time_s[-1, k],
+            "impulse_Ns": fired.impulse_Ns[-1, k],
+            "leak_Ns": float(np.sum(fired.leak_N[:-1, k]) * fired.period_s),
+            "pulses": fired.pulses_of(name, truth.time_s),
+        }
+        for k, name in enumerate(fired.names)
+    }
+
+
+def _drag_of(flight) -> dict:
+    """Bearing drag of every wheel as flown; nothing where friction was off."""
+    wheels = flight.craft.at(flight.scenario.epoch_ns).wheels if flight.scenario.friction else ()
+    return {
+        w.name: {"viscous_Nms": w.drag.viscous, "coulomb_Nm": w.drag.coulomb, "stiction_Nm": w.drag.stiction}
+        for w in wheels
+    }

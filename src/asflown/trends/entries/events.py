@@ -1,0 +1,218 @@
+"""Actuations: which, when, and where their telemetry is; listed by hand or found from the motor's current."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from ...kit.config import read_bytes, toml_table, validated
+from ...kit.errors import BadInput, some_of
+from ...kit.timeline import NS, utc_label, utc_to_tai_ns
+from ...telemetry.telemetry import Channel, Telemetry
+
+#: A motor counts as running above this share of its largest current, and as stalled above the middle of the two levels.
+_RUNNING = 0.3
+#: A rise of the running current to a stall: at least by this share.
+_STALL_RISE = 0.15
+#: Span kept of a record around a found actuation. [s]
+_MARGIN_S = 60.0
+
+_REMEDY = (
+    "An event has id, kind (deploy or stow) and date, and with telemetry file, motor_on_s and motor_off_s "
+    "(seconds from the file's epoch); motor, note, start_s and stop_s if wanted. See docs/trends.md."
+)
+
+
+class _Row(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    id: str = Field(min_length=1)
+    kind: Literal["deploy", "stow"]
+    file: str | None = None
+    motor_on_s: float | None = Field(default=None, allow_inf_nan=False)
+    motor_off_s: float | None = Field(default=None, allow_inf_nan=False)
+    start_s: float | None = Field(default=None, allow_inf_nan=False)
+    stop_s: float | None = Field(default=None, allow_inf_nan=False)
+    motor: str | None = None
+    date: str | None = None
+    note: str = ""
+
+
+class _List(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    event: tuple[_Row, ...] = Field(min_length=1)
+
+
+@dataclass(frozen=True)
+class Event:
+    """One actuation.  Times count in seconds from the file's epoch; without ``file`` only its date counts.
+
+    ``motor_on_sigma_s``: zero where the command's time is known."""
+
+    id: str
+    kind: str
+    date: str | None = None  # UTC
+    file: Path | None = None
+    motor_on_s: float = math.nan
+    motor_off_s: float = math.nan
+    start_s: float | None = None
+    stop_s: float | None = None
+    motor: str | None = None
+    note: str = ""
+    motor_on_sigma_s: float = 0.0
+
+
+def load_events(path: str | Path) -> list[Event]:
+    """Events of a list, TOML ([[event]]) or CSV, in order of the file.
+
+    Raises BadInput for an unreadable list, unknown keys, a repeated id, an event with neither file nor date, times
+    out of order, and files that are not there: nothing is analysed of a list with a fault."""
+    path = Path(path)
+    source = read_bytes(path, "event list", "Give an event list (TOML or CSV). " + _REMEDY)
+    table = {"event": _csv_rows(source, path)} if path.suffix.lower() == ".csv" else toml_table(source, path)
+    rows = validated(_List, table, path, _REMEDY).event
+    seen: set[str] = set()
+    for row in rows:
+        if row.id in seen:
+            raise BadInput(f"two events are called {row.id!r}", file=path, remedy="Give every event an id of its own.")
+        seen.add(row.id)
+    return [_checked(row, path) for row in rows]
+
+
+def is_event_list(path: str | Path) -> bool:
+    """Whether a file lists events, rather than being telemetry itself."""
+    path = Path(path)
+    if path.suffix.lower() == ".toml":
+        return True
+    if path.suffix.lower() != ".csv" or not path.is_file():
+        return False
+    with open(path, "rb") as file:
+        head = next((line for line in file if line.strip() and not line.lstrip().startswith(b"#")), b"")
+    return {b"id", b"kind"} <= {cell.strip() for cell in head.split(b",")}
+
+
+def _csv_rows(source: bytes, path: Path) -> list[dict]:
+    try:
+        text = source.decode("utf-8-sig")
+    except UnicodeDecodeError as why:
+        raise BadInput(f"not a text file ({why})", file=path, remedy=_REMEDY) from None
+    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    rows = []
+    for number, raw in enumerate(csv.DictReader(io.StringIO("\n".join(lines))), start=2):
+        if None in raw or None in raw.values():
+            raise BadInput("this row does not have as many cells as the header", file=path, line=number, remedy=_REMEDY)
+        row: dict = {k.strip(): v.strip() for k, v in raw.items() if v.strip() != ""}
+        for name in ("motor_on_s", "motor_off_s", "start_s", "stop_s"):
+            if name in row:
+                try:
+                    row[name] = float(row[name])
+                except ValueError:
+                    raise BadInput(
+                        f"{name} {row[name]!r} is not a number", file=path, line=number, remedy=_REMEDY
+                    ) from None
+        rows.append(row)
+    return rows
+
+
+def _checked(row: _Row, path: Path) -> Event:
+    def wrong(what: str) -> BadInput:
+        return BadInput(f"event {row.id!r}: {what}", file=path, remedy=_REMEDY)
+
+    date = None
+    if row.date is not None:
+        try:
+            date = utc_label(int(utc_to_tai_ns(row.date)))
+        except BadInput as why:
+            raise wrong(why.what) from None
+    file = None
+    if row.file is None:
+        if date is None:
+            raise wrong("without a file it needs a date")
+    else:
+        file = path.parent / row.file
+        if not file.is_file():
+            raise wrong(f"there is no file {row.file} beside the list")
+        if row.motor_on_s is None or row.motor_off_s is None:
+            raise wrong("with a file it needs motor_on_s and motor_off_s")
+        if row.motor_on_s >= row.motor_off_s:
+            raise wrong("the motor is switched off before it is on")
+    if row.start_s is not None and row.stop_s is not None and not row.start_s < row.stop_s:
+        raise wrong("its span ends before it starts")
+    on, off = (math.nan if t is None else t for t in (row.motor_on_s, row.motor_off_s))
+    return Event(row.id, row.kind, date, file, on, off, row.start_s, row.stop_s, row.motor, row.note)
+
+
+def find_events(telemetry: Telemetry, prefix: str = "") -> list[Event]:
+    """Actuations of a mechanism in a record, from its motor's current and its angle.
+
+    The current is sampled seldom: the motor came on between two samples, and the middle is taken with the sigma
+    of not knowing better.  Raises BadInput where there is no motor current, or the motor never runs."""
+    current = _one_of(telemetry, "motor_current")
+    angle = _one_of(telemetry, "cover_angle")
+    c, t = current.values, telemetry.seconds(current.tai_ns)
+    largest = float(np.max(c, initial=0.0))
+    running = c > _RUNNING * largest
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], running.astype(int), [0]])))
+    events = []
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        if first == 0 or end == len(t):
+            continue  # the record does not hold it whole
+        before, after = float(t[first - 1]), float(t[first])
+        off = 0.5 * float(t[end - 1] + t[end])
+        moved = np.interp([before, float(t[end])], telemetry.seconds(angle.tai_ns), angle.values)
+        kind = "deploy" if moved[1] > moved[0] else "stow"
+        on = 0.5 * (before + after)
+        date = utc_label(telemetry.epoch_ns + round(on * NS)) if telemetry.dated else None
+        events.append(Event(
+            f"{prefix}{kind}-{(date or f'{on:.0f}s')[:10]}", kind, date, Path(telemetry.source), on, off,
+            max(before - _MARGIN_S, 0.0), off + _MARGIN_S, current.member or None, "found from the motor's current",
+            (after - before) / np.sqrt(12),
+        ))  # fmt: skip
+    if not events:
+        raise BadInput(
+            "no whole actuation is in this record: the motor's current does not rise and fall again",
+            file=telemetry.source, channel=current.name, remedy="List the events instead. " + _REMEDY,
+        )  # fmt: skip
+    return events
+
+
+def stall(telemetry: Telemetry, event: Event) -> tuple[float, float] | None:
+    """When the motor stalled, seconds after it came on, and sigma; None where the current shows no jump.
+
+    A running motor that is stopped by its end stop draws more: the time lies between the two samples of the jump,
+    and is known no better than that (000 section III: 64 s apart).  Sigma is half the interval: events sampled at the
+    same phase err together, so that neighbours may differ by a whole one for nothing."""
+    try:
+        current = _one_of(telemetry, "motor_current")
+    except BadInput:
+        return None
+    t = telemetry.seconds(current.tai_ns)
+    on = (t > event.motor_on_s) & (t < event.motor_off_s)
+    t, c = t[on], current.values[on]
+    if len(c) < 3:
+        return None
+    jump = int(np.argmax(np.diff(c)))
+    before, after = float(np.median(c[: jump + 1])), float(np.median(c[jump + 1 :]))
+    if after < (1 + _STALL_RISE) * before:
+        return None
+    return 0.5 * float(t[jump] + t[jump + 1]) - event.motor_on_s, 0.5 * float(t[jump + 1] - t[jump])
+
+
+def _one_of(telemetry: Telemetry, stem: str) -> Channel:
+    """The only channel of a family.  Raises BadInput where there is none, or several."""
+    found = [c for c in telemetry.channels.values() if c.kind.stem == stem]
+    if len(found) != 1:
+        what = "is needed and is not in the telemetry" if not found else f"stands there {len(found)} times"
+        raise BadInput(
+            f"the channel {stem} {what}", file=telemetry.source, channel=stem,
+            remedy=f"The telemetry holds: {some_of(telemetry.channels)}.",
+        )  # fmt: skip
+    return found[0].usable

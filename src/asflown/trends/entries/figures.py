@@ -1,0 +1,333 @@
+"""Figures of merit of an actuation, each declared in a few lines; the rest is done for it.
+
+A figure is a function of what one actuation looks like; its docstring says what it is.  One of the torque is
+computed on every basis (fused with its sigma, and both printed methods), one of telemetry once::
+
+    @figure_of_merit("N m s")
+    def late_impulse(torque: Torque):
+        \"\"\"Area under the torque from minute 1.35 to 3 after the motor came on.\"\"\"
+        return torque.impulse(81.0, 180.0)
+"""
+
+from __future__ import annotations
+
+import inspect
+import runpy
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from ...craft.model import Mechanism
+from ...kit.ensemble import spread
+from ...kit.errors import BadInput
+from ...kit.plain import finite
+from ...telemetry.telemetry import Telemetry
+from ..entry import Value
+from .events import Event, stall
+
+#: The first kind of motion lasts from the motor's start to minute 1.35 after it (000 section V: 1.00 to 2.35). [s]
+FIRST_PHASE_S = 81.0
+#: Excursions nearer than this to a larger one, or standing out less than this share of the largest, are part of it.
+_APART_S, _STANDS_OUT = 5.0, 0.1
+#: A mechanism is where it should be within this much: twice the potentiometer's usual step. [rad]
+END_WITHIN = np.radians(1.0)
+
+
+@dataclass(frozen=True)
+class Torque:
+    """Torque about the hinge over time from the motor's start, and draws from its posterior where there are any."""
+
+    time_s: np.ndarray  # (N,)
+    mean_Nm: np.ndarray  # (N,)
+    drawn_time_s: np.ndarray = field(default_factory=lambda: np.empty(0))  # (F,)
+    drawn_Nm: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))  # (K, F); K = 0: none
+    start_sigma_s: float = 0.0  # how well the motor's start is known
+
+    def impulse(self, start_s: float, stop_s: float) -> Measured:
+        """Angular impulse between two times from the motor's start; unknown beyond the record. [N m s]"""
+        step = float(self.time_s[1] - self.time_s[0])
+        if start_s < self.time_s[0] - step or stop_s > self.time_s[-1] + step:
+            return Measured(None, None, f"the record does not hold {start_s:g} to {stop_s:g} s after the motor's start")
+        value = float(_area(self.time_s, self.mean_Nm, start_s, stop_s))
+        if not len(self.drawn_Nm):
+            return Measured(value)
+        own = float(spread(_area(self.drawn_time_s, self.drawn_Nm, start_s, stop_s)))
+        ends = np.interp([start_s, stop_s], self.time_s, self.mean_Nm)
+        return Measured(value, float(np.hypot(own, (ends[1] - ends[0]) * self.start_sigma_s)))
+
+    def momentum(self) -> tuple[np.ndarray, np.ndarray]:
+        """Momentum given to the body since the motor's start, and drawn ones, at ``time_s`` and ``drawn_time_s``. [N m s]"""
+        own = _cumulated(self.time_s, self.mean_Nm)
+        return own, _cumulated(self.drawn_time_s, self.drawn_Nm) if len(self.drawn_Nm) else self.drawn_Nm
+
+    def excursions(self, after_s: float, sign: int) -> np.ndarray:
+        """Times of the excursions of one sign after a time, the largest first. [s]"""
+        late = self.time_s >= after_s
+        t, v = self.time_s[late], sign * self.mean_Nm[late]
+        if len(v) < 3 or not np.nanmax(v) > 0:
+            return np.empty(0)
+        step = float(np.median(np.diff(t)))
+        at, _ = find_peaks(
+            np.nan_to_num(v), height=0, prominence=_STANDS_OUT * np.nanmax(v), distance=max(1, round(_APART_S / step))
+        )
+        return t[at[np.argsort(-v[at])]]
+
+    def height(self, times_s) -> Measured:
+        """Mean torque at these times, of the excursions there. [N m]
+
+        Not each draw's own extreme near them: drawn torques are rougher than a mechanism's, and their extremes 10 %
+        too high (studies/peak_figures.py)."""
+        value = float(np.mean(np.interp(times_s, self.time_s, self.mean_Nm)))
+        return Measured(value, self.spread_at(self.drawn_Nm, times_s))
+
+    def spread_at(self, drawn, times_s) -> float | None:
+        """One sigma of the mean over these times of drawn curves (K, F); None without any."""
+        if not len(drawn):
+            return None
+        near = [int(np.argmin(np.abs(self.drawn_time_s - t))) for t in times_s]
+        return float(spread(drawn[:, near].mean(axis=1)))
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A value, its sigma where there is one, and what there is to doubt."""
+
+    value: float | None
+    sigma: float | None = None
+    doubt: str = ""
+
+
+@dataclass(frozen=True)
+class Actuation:
+    """One actuation as its telemetry shows it, for figures that are not of the torque."""
+
+    telemetry: Telemetry
+    event: Event
+    mechanism: Mechanism
+
+    def samples(self, stem: str) -> tuple[np.ndarray, np.ndarray] | None:
+        """Times from the motor's start and usable values of the mechanism's channel; None where it has none."""
+        for name in (f"{stem}_{self.mechanism.name}", stem):
+            if name in self.telemetry:
+                c = self.telemetry.channel(name).usable
+                return self.telemetry.seconds(c.tai_ns) - self.event.motor_on_s, c.values
+        return None
+
+    @property
+    def running_s(self) -> float:
+        return self.event.motor_off_s - self.event.motor_on_s
+
+    @property
+    def target_rad(self) -> float:
+        return self.mechanism.deployed if self.event.kind == "deploy" else self.mechanism.stowed
+
+    @cached_property
+    def stall(self) -> tuple[float, float] | None:
+        """Stall after the motor's start and its sigma. [s]"""
+        return stall(self.telemetry, self.event)
+
+    def level(self, stem: str, start_s: float, stop_s: float) -> Measured:
+        """Median of a channel between two times, and the standard error of that."""
+        found = self.samples(stem)
+        if found is None:
+            return Measured(None)
+        inside = found[1][(found[0] > start_s) & (found[0] < stop_s)]
+        if not len(inside):
+            return Measured(None)
+        sigma = None if len(inside) < 3 else float(1.2533 * np.std(inside, ddof=1) / np.sqrt(len(inside)))
+        return Measured(float(np.median(inside)), sigma)
+
+
+@dataclass(frozen=True)
+class FigureOfMerit:
+    """One declared figure: ``of`` a Torque or an Actuation; ``judged`` for trend and watch; ``is_check``: zero if all is well."""
+
+    name: str
+    unit: str
+    meaning: str
+    of: str  # torque or actuation
+    compute: Callable[..., Measured | None]
+    judged: bool
+    is_check: bool
+
+
+FIGURES: dict[str, FigureOfMerit] = {}
+
+
+def figure_of_merit(unit: str, *, judged: bool = True, is_check: bool = False):
+    """Declare the function below as a figure of merit, in that SI unit, under its own name.
+
+    Its one argument, called ``torque`` or ``actuation``, says what it is of; it returns a Measured, or None
+    where it cannot be computed.  Raises TypeError for any other signature or without a docstring."""
+
+    def declare(compute):
+        names = list(inspect.signature(compute).parameters)
+        if names not in (["torque"], ["actuation"]) or not compute.__doc__:
+            raise TypeError(f"{compute.__name__}: a figure has one argument, torque or actuation, and a docstring")
+        meaning = " ".join(compute.__doc__.split())
+        FIGURES[compute.__name__] = FigureOfMerit(compute.__name__, unit, meaning, names[0], compute, judged, is_check)
+        return compute
+
+    return declare
+
+
+def load_figures(path: str | Path) -> None:
+    """Declare the figures of a user's Python file beside the shipped ones.
+
+    Raises BadInput where the file is not there or does not run."""
+    if not Path(path).is_file():
+        raise BadInput("there is no such file of figures", file=path, remedy="Give a Python file; see docs/trends.md.")
+    try:
+        runpy.run_path(str(path))
+    except Exception as why:
+        raise BadInput(
+            f"this file of figures does not run ({type(why).__name__}: {why})", file=path, remedy="See docs/trends.md."
+        ) from why
+
+
+def measure(figure: FigureOfMerit, of, basis: str) -> tuple[Value, str]:
+    """One figure on one basis, and its doubt; unknown where it has no answer."""
+    found = figure.compute(of) or Measured(None)
+    value, sigma = finite(found.value), finite(found.sigma)
+    return Value(figure.name, basis, value, None if value is None else sigma, figure.unit), found.doubt
+
+
+@figure_of_merit("N m s")
+def angular_impulse(torque: Torque):
+    """Area under the torque from the motor's start to minute 1.35 after it (000 section V: minute 1.00 to 2.35)."""
+    return torque.impulse(0.0, FIRST_PHASE_S)
+
+
+@figure_of_merit("N m")
+def peak_positive(torque: Torque):
+    """Mean of the two largest excursions after minute 1.35 from the motor's start (000 section V)."""
+    return _two_largest(torque, 1)
+
+
+@figure_of_merit("N m")
+def peak_negative(torque: Torque):
+    """Mean of the two smallest excursions after minute 1.35 from the motor's start (000 section V)."""
+    return _two_largest(torque, -1)
+
+
+@figure_of_merit("N m s", judged=False, is_check=True)
+def net_impulse(torque: Torque):
+    """Area under the torque from the motor's start to the end of the record: zero, where nothing acts from outside."""
+    return torque.impulse(0.0, float(torque.time_s[-1]))
+
+
+@figure_of_merit("N m s")
+def peak_momentum(torque: Torque):
+    """Largest momentum that the mechanism holds on its way, with its sign."""
+    own, drawn = torque.momentum()
+    k = int(np.nanargmax(np.abs(own)))
+    return Measured(float(own[k]), torque.spread_at(drawn, torque.time_s[[k]]))
+
+
+@figure_of_merit("s", judged=False)
+def time_of_peak_positive(torque: Torque):
+    """When the largest excursion comes, after the motor's start."""
+    return _time_of_largest(torque, 1)
+
+
+@figure_of_merit("s", judged=False)
+def time_of_peak_negative(torque: Torque):
+    """When the smallest excursion comes, after the motor's start."""
+    return _time_of_largest(torque, -1)
+
+
+@figure_of_merit("s")
+def time_to_stall(actuation: Actuation):
+    """From the motor's start to the jump of its current at the end stop; no better known than the sampling allows."""
+    return None if actuation.stall is None else Measured(*actuation.stall)
+
+
+@figure_of_merit("rad", judged=False)
+def end_angle(actuation: Actuation):
+    """Angle at the last sample."""
+    found = actuation.samples("cover_angle")
+    if found is None or not len(found[1]):
+        return None
+    off = abs(found[1][-1] - actuation.target_rad)
+    wanted = (
+        ""
+        if off < END_WITHIN
+        else (
+            f"the {actuation.mechanism.name} ends at {np.degrees(found[1][-1]):.2f} deg, "
+            f"not at {np.degrees(actuation.target_rad):.2f} deg"
+        )
+    )
+    return Measured(float(found[1][-1]), None, wanted)
+
+
+@figure_of_merit("", judged=False)
+def microswitch(actuation: Actuation):
+    """1 where the last reading of the switch is the commanded end position, 0 where it is another."""
+    found = actuation.samples("microswitch")
+    if found is None or not len(found[1]):
+        return None
+    wanted = {"deploy": "deployed", "stow": "stowed"}[actuation.event.kind]
+    right = str(found[1][-1]) == wanted
+    return Measured(float(right), None, "" if right else f"the microswitch ends at {found[1][-1]}, not {wanted}")
+
+
+@figure_of_merit("A")
+def run_current(actuation: Actuation):
+    """Median motor current from the start to the stall."""
+    until = actuation.stall[0] if actuation.stall else actuation.running_s
+    return actuation.level("motor_current", 0.0, until)
+
+
+@figure_of_merit("A")
+def stall_current(actuation: Actuation):
+    """Median motor current from the stall to the end."""
+    return None if not actuation.stall else actuation.level("motor_current", actuation.stall[0], actuation.running_s)
+
+
+def _two_largest(torque: Torque, sign: int) -> Measured | None:
+    times = torque.excursions(FIRST_PHASE_S, sign)[:2]
+    if not len(times):
+        return None
+    found = torque.height(times)
+    doubt = "" if len(times) == 2 else f"only one excursion of sign {sign:+d} stands out after minute 1.35"
+    return Measured(found.value, found.sigma, doubt)
+
+
+def _time_of_largest(torque: Torque, sign: int) -> Measured | None:
+    times = torque.excursions(FIRST_PHASE_S, sign)
+    if not len(times):
+        return None
+    if not len(torque.drawn_Nm):
+        return Measured(float(times[0]))
+    near = np.abs(torque.drawn_time_s - times[0]) <= _APART_S
+    drawn = torque.drawn_time_s[near][np.argmax(sign * torque.drawn_Nm[:, near], axis=1)]
+    return Measured(float(times[0]), float(np.hypot(spread(drawn), torque.start_sigma_s)))
+
+
+def _area(time_s, values, start_s: float, stop_s: float):
+    """Integral of (..., N) between two times, straight lines between the instants."""
+    whole = _cumulated(time_s, values)
+    ends = [_at(time_s, values, whole, t) for t in (start_s, stop_s)]
+    return ends[1] - ends[0]
+
+
+def _cumulated(time_s, values) -> np.ndarray:
+    """Integral since time zero, (..., N)."""
+    step = np.diff(time_s)
+    sums = np.concatenate(
+        [np.zeros((*np.shape(values)[:-1], 1)), np.cumsum(0.5 * step * (values[..., 1:] + values[..., :-1]), axis=-1)],
+        axis=-1,
+    )
+    return sums - np.asarray(_at(time_s, values, sums, 0.0))[..., None]
+
+
+def _at(time_s, values, whole, t: float):
+    """The cumulated integral at an instant between two samples."""
+    k = int(np.clip(np.searchsorted(time_s, t) - 1, 0, len(time_s) - 2))
+    part = np.clip(t - time_s[k], 0, time_s[k + 1] - time_s[k])
+    slope = (values[..., k + 1] - values[..., k]) / (time_s[k + 1] - time_s[k])
+    return whole[..., k] + part * (values[..., k] + 0.5 * slope * part)

@@ -1,0 +1,48 @@
+"""What is kept of one inertia estimate: the tensor's elements with their total sigma, and the external torque."""
+
+from __future__ import annotations
+
+from ...craft.model import Craft, tensor
+from ...dynamics.rigid_body import ELEMENTS, elements_of
+from ...estimate.inertia import InertiaResult
+from ...kit.plain import finite
+from ...kit.timeline import utc_label
+from ...telemetry.channels import AXES
+from ...telemetry.telemetry import Telemetry
+from ..entry import Entry, Value
+from .of_record import record_entry
+
+KIND = "inertia"
+
+
+def inertia_entry(
+    result: InertiaResult, telemetry: Telemetry, craft: Craft, event_id: str | None, provenance: dict
+) -> Entry:
+    """Raises BadInput for telemetry without an epoch."""
+    unit, torque_unit = "kg m2", "N m"
+    if result.relative:
+        unit, torque_unit = "per spin inertia", "rad/s^2, per unit spin inertia"
+    values = [
+        Value(name, "telemetry", finite(v), finite(s), unit)
+        for name, v, s in zip(ELEMENTS, elements_of(result.inertia), elements_of(result.sigma_total), strict=True)
+    ]
+    values += [
+        Value(f"external_torque_{a}", "telemetry", finite(t), finite(s), torque_unit)
+        for a, t, s in zip(AXES, result.torque, result.torque_sigma, strict=True)
+    ]
+    return record_entry(KIND, tuple(values), result.doubts, telemetry, craft, event_id, provenance)
+
+
+def history_entries(craft: Craft) -> list[Entry]:
+    """The craft file's own estimates of its tensor, one entry a date; no sigma, since none was published."""
+    known = [m for m in craft.mass_properties if m.basis == "estimated" and m.inertia is not None]
+    return [
+        Entry(
+            craft.name, f"{KIND}-{utc_label(m.date)[:10]}", KIND, utc_label(m.date), note=m.source,
+            values=tuple(
+                Value(n, "telemetry", float(v), None, "kg m2") for n, v in zip(ELEMENTS, elements_of(tensor(m.inertia)), strict=True)
+            ),
+            doubts=(f"taken from the craft file ({m.source}), without a sigma",),
+        )
+        for m in sorted(known, key=lambda m: m.date)
+    ]  # fmt: skip

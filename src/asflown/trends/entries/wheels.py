@@ -1,0 +1,39 @@
+"""What is kept of the wheels of one record: drag, spikes and use, beside what is kept of actuations."""
+
+from __future__ import annotations
+
+from ...craft.model import Craft
+from ...estimate.wheels import WheelDrag, WheelsResult
+from ...kit.plain import finite
+from ...telemetry.telemetry import Telemetry
+from ..entry import Entry, Value
+from .of_record import record_entry
+
+KIND = "wheels"
+_BASIS = "telemetry"
+
+
+def wheel_entry(
+    result: WheelsResult, telemetry: Telemetry, craft: Craft, event_id: str | None, provenance: dict
+) -> Entry:
+    """The entry of one record's wheels.  Raises BadInput for telemetry without an epoch."""
+    values = tuple(v for w in result.wheels for v in _values(w))
+    return record_entry(KIND, values, result.doubts, telemetry, craft, event_id, provenance)
+
+
+def _values(w: WheelDrag):
+    f = w.fit
+    torque, per_rate = ("N m", "N m s")
+    if f is not None and f.relative:
+        torque, per_rate = "rad/s^2, per unit spin inertia", "1/s, per unit spin inertia"
+
+    def of(figure: str, value, sigma, unit: str) -> Value:
+        value = finite(value)
+        return Value(f"{figure}_{w.name}", _BASIS, value, None if value is None else sigma, unit)
+
+    yield of("coulomb_drag", f and f.coulomb, f and f.sigma_coulomb, torque)
+    yield of("viscous_drag", f and f.viscous, f and f.sigma_viscous, per_rate)
+    yield of("drag_spikes", None if w.spikes is None else len(w.spikes), None, "")
+    yield of("low_speed_dwell", w.use.low_speed_dwell_s, None, "s")
+    yield of("zero_crossings", w.use.zero_crossings, None, "")
+    yield of("revolutions", w.use.revolutions, None, "")

@@ -1,0 +1,320 @@
+"""The inertia tensor from slews: laws, recovery from simulated flights, traps, and real recordings."""
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from asflown.craft.load import load_craft
+from asflown.dynamics.environment import gravity_gradient
+from asflown.dynamics.rigid_body import elements_of
+from asflown.estimate.inertia.slews import find_slews
+from asflown.estimate.inertia.tensor import METHODS, inertia_tensor
+from asflown.kit.errors import BadInput
+from asflown.kit.rotations import quaternion
+from asflown.sim.flight.closed_loop import fly
+from asflown.telemetry.channels import AXES, kind_of
+from asflown.telemetry.load import load_telemetry
+from asflown.telemetry.tables import write_table
+from asflown.telemetry.telemetry import Channel, Telemetry
+from asflown.trends.entries.inertia import inertia_entry
+from cli.program import complaint, run
+from conftest import ROOT, flight_data
+
+CASSINI = load_craft("cassini")
+NS = 1_000_000_000
+
+
+@cache
+def flight(seed=1, noise="nominal", **_):
+    return fly("slews", seed=seed, noise=noise)
+
+
+@cache
+def fitted(seed=1, method="consistent"):
+    return inertia_tensor(flight(seed).telemetry, CASSINI, method=method)
+
+
+def changed(tlm: Telemetry, stem: str, change) -> Telemetry:
+    return replace(tlm, channels={n: change(c) if c.kind.stem == stem else c for n, c in tlm.channels.items()})
+
+
+def without(tlm: Telemetry, stem: str) -> Telemetry:
+    return replace(tlm, channels={n: c for n, c in tlm.channels.items() if c.kind.stem != stem})
+
+
+def pulls(result, truth) -> np.ndarray:
+    return elements_of(result.inertia - truth) / elements_of(result.sigma_random)
+
+
+# ---- laws ---------------------------------------------------------------------------------------------------
+
+
+def test_law_slews_are_found_with_their_axis_angle_and_rate():
+    tlm = flight().telemetry
+    w = np.stack([tlm.channel(f"body_rate_{a}").values for a in AXES], axis=1)
+    slews = find_slews(tlm.seconds(tlm.channel("body_rate_x").tai_ns), w, 2e-6)
+    assert [s.about for s in slews] == ["x", "y", "z", "skew"]
+    for s, axis, sign in zip(slews, ([1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]), (1, -1, 1, -1), strict=True):
+        assert np.array(s.axis) == pytest.approx(sign * np.array(axis) / np.linalg.norm(axis), abs=0.01)
+        assert s.angle_rad == pytest.approx(np.radians(25), rel=0.01) and s.rate_rad_s == pytest.approx(2e-3, rel=0.02)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_law_without_noise_every_method_finds_the_tensor(method):
+    still = flight(noise="none")
+    result = inertia_tensor(still.telemetry, CASSINI, method=method)
+    # what is left to the paper's methods is the first reading, taken when the loop has not quite settled
+    assert elements_of(result.inertia - still.inertia_kgm2) == pytest.approx(np.zeros(6), abs=0.5)
+
+
+def test_law_the_scale_of_the_wheels_is_the_scale_of_the_tensor():
+    """Degenerate: 1 % more spin inertia is 1 % more tensor, and no sigma may be smaller than the prior's."""
+    wheels = tuple(w.model_copy(update={"spin_inertia": 1.01 * w.spin_inertia}) for w in CASSINI.wheels)
+    other = inertia_tensor(flight().telemetry, CASSINI.model_copy(update={"wheels": wheels}), method="gls")
+    one = fitted(1, "gls")
+    assert other.inertia == pytest.approx(1.01 * one.inertia, rel=1e-4, abs=0.05)
+    for result in (one, fitted()):
+        assert np.all(result.sigma_systematic >= 0.0024 * np.abs(result.inertia) * (1 - 1e-3))
+
+
+def test_law_both_estimates_of_every_product_are_given_axis_by_axis():
+    result = fitted(1, "axis")
+    assert set(result.products) == {"Ixy", "Ixz", "Iyz"}
+    for (i, j), name in (((0, 1), "Ixy"), ((0, 2), "Ixz"), ((1, 2), "Iyz")):
+        assert np.mean(result.products[name]) == pytest.approx(result.inertia[i, j])
+    assert any("about no single body axis" in d for d in result.doubts)
+
+
+def test_law_momentum_balance_with_gravity_is_exact_where_the_torque_is():
+    """A craft that swings in its orbit: the torque that Euler's equation and gravity ask for gives the tensor back."""
+    I_B = np.array([[9e7, 3e5, -4e5], [3e5, 6e7, 2e5], [-4e5, 2e5, 1.2e8]])
+    t = np.arange(0.0, 6 * 5600, 2.0)
+    n = 2 * np.pi / 5600
+    swing = np.stack([0.06 * np.sin(2 * n * t), 0.05 * np.sin(3.3 * n * t + 1), 0.07 * np.sin(1.7 * n * t + 2)], axis=1)
+    R = Rotation.from_rotvec(np.outer(-n * t, [0, 1, 0])) * Rotation.from_rotvec(swing)
+    step = (R[:-1].inv() * R[1:]).as_rotvec() / 2.0
+    w = np.empty_like(swing)
+    w[1:-1] = 0.5 * (step[1:] + step[:-1])
+    w[0], w[-1] = step[0], step[-1]
+    r_N = 6.8e6 * np.stack([np.cos(n * t), 0 * t, np.sin(n * t)], axis=1)
+    H = R.apply(w @ I_B)
+    constant = np.array([0.3, -0.2, 0.1])
+    u = R.inv().apply(np.gradient(H, 2.0, axis=0)) - gravity_gradient(I_B, R.inv().apply(r_N)) - constant
+    q = quaternion(R)
+    columns = {f"quaternion_{m}": q[:, k] for k, m in enumerate("wxyz")}
+    for k, a in enumerate(AXES):
+        columns |= {f"body_rate_{a}": w[:, k], f"control_torque_{a}": u[:, k], f"orbit_position_{a}": r_N[:, k]}
+    ns = 592_000_000 * NS + np.rint(t * NS).astype(np.int64)
+    made = {k: Channel(k, ns, v, np.ones(len(ns), bool), kind_of(k).unit) for k, v in columns.items()}
+    result = inertia_tensor(Telemetry(made, int(ns[0])), load_craft("iss"))
+    assert result.method == "momentum balance" and not result.excitation.untold
+    assert result.inertia == pytest.approx(I_B, rel=2e-3, abs=1e5)
+    assert result.torque == pytest.approx(constant, abs=0.02)
+
+
+# ---- recovery -----------------------------------------------------------------------------------------------
+
+
+def test_recovery_of_tensor_and_torque():
+    """Two flights; the campaign over two hundred is benchmarks/inertia_accuracy.py."""
+    found = np.array([pulls(fitted(seed), flight(seed).inertia_kgm2) for seed in range(1, 3)])
+    assert np.abs(found).max() < 4 and 0.6 < found.std() < 1.5
+    for seed in range(1, 3):
+        r = fitted(seed)
+        assert elements_of(r.sigma_random) == pytest.approx([0.2, 0.11, 0.08, 0.165, 0.07, 0.1], rel=0.25)  # kg m2
+        assert np.all(np.abs(r.torque) < 4.5 * r.torque_sigma) and np.all(r.torque_sigma < 0.4e-6)
+
+
+@pytest.mark.slow
+def test_recovery_pulls_are_unit_normal():
+    found = np.array(
+        [pulls(inertia_tensor(fly("slews", seed=s).telemetry, CASSINI), flight().inertia_kgm2) for s in range(40)]
+    )
+    assert np.all(np.abs(found.mean(axis=0)) < 0.5) and found.std() == pytest.approx(1.0, abs=0.15)
+
+
+def test_recovery_of_an_external_torque_in_body_axes():
+    torque = {"shape": "constant", "torque": "-0.53e-6 -2.11e-6 1.83e-6 N m"}
+    result = inertia_tensor(fly("slews", seed=7, torques=[torque]).telemetry, CASSINI)
+    assert np.all(np.abs(result.torque - [-0.53e-6, -2.11e-6, 1.83e-6]) < 4 * result.torque_sigma)
+    assert result.torque[1] / result.torque_sigma[1] < -4
+
+
+def test_recovery_on_another_simulator():
+    for name in ("slew", "slew_ext"):
+        truth = json.loads(flight_data(f"simulated/{name}.json").read_text())
+        tlm = load_telemetry(flight_data(f"simulated/{name}.csv.gz"), craft=CASSINI)
+        result = inertia_tensor(tlm, CASSINI)
+        assert np.all(np.abs(pulls(result, np.array(truth["inertia_kg_m2"]))) < 4)
+        assert np.all(np.abs(result.torque - truth["external_torque_body_Nm"]) < 4 * result.torque_sigma)
+        for method in ("axis", "all", "gls"):
+            other = inertia_tensor(tlm, CASSINI, method=method)
+            assert np.all(
+                np.abs(elements_of(other.inertia - truth["inertia_kg_m2"])) < 4 * elements_of(other.sigma_total)
+            )
+
+
+# ---- traps --------------------------------------------------------------------------------------------------
+
+
+def test_trap_signs_of_the_quaternion_mean_nothing():
+    sign = np.random.default_rng(2).choice([-1.0, 1.0], len(flight().telemetry.channel("quaternion_w").values))
+    flipped = changed(flight().telemetry, "quaternion", lambda c: replace(c, values=sign * c.values))
+    assert inertia_tensor(flipped, CASSINI).inertia == pytest.approx(fitted().inertia, abs=0.01)
+
+
+def test_trap_quaternion_the_other_way_round_is_named(tmp_path):
+    turned = changed(flight().telemetry, "quaternion", lambda c: c if c.member == "w" else replace(c, values=-c.values))
+    with pytest.raises(BadInput, match="conjugate"):
+        inertia_tensor(turned, CASSINI)
+    write_table(turned, tmp_path / "turned.csv")
+    assert "conjugate" in complaint("inertia", tmp_path / "turned.csv")
+
+
+def test_trap_rates_in_degrees_are_named_with_and_without_attitude():
+    wrong = changed(flight().telemetry, "body_rate", lambda c: replace(c, values=np.degrees(c.values)))
+    with pytest.raises(BadInput, match="deg/s labelled rad/s"):
+        inertia_tensor(wrong, CASSINI)
+    with pytest.raises(BadInput, match="deg/s labelled rad/s"):
+        inertia_tensor(without(wrong, "quaternion"), CASSINI)
+
+
+@pytest.mark.parametrize("stem, words", [("wheel_rate", "wheel rates"), ("body_rate", "body rates")])
+def test_trap_time_stamps_apart_are_found_said_and_mended(stem, words):
+    late = changed(flight().telemetry, stem, lambda c: replace(c, tai_ns=c.tai_ns + 4 * NS))
+    result = inertia_tensor(late, CASSINI)
+    assert any(f"the {words} are stamped 4.0" in d and "late" in d for d in result.doubts)
+    assert elements_of(result.inertia - fitted().inertia) == pytest.approx(np.zeros(6), abs=0.15)
+
+
+def test_trap_a_thruster_inside_a_slew_is_left_out_and_said():
+    kick = {"shape": "table", "axis": "x", "times": "800 800.5 801.5 802 s", "torques": "0 0.5 0.5 0 N m"}
+    kicked = fly("slews", seed=5, torques=[kick])
+    untold = inertia_tensor(kicked.telemetry, CASSINI)
+    assert any("momentum steps near 80" in d for d in untold.doubts)
+    t = np.arange(0, 2401, 8.0)
+    ns = kicked.telemetry.epoch_ns + np.rint(t * NS).astype(np.int64)
+    on = Channel("on_time_Y1", ns, np.where(t > 800, 1.5, 0.0), np.ones(len(t), bool), "s")
+    told = inertia_tensor(replace(kicked.telemetry, channels=kicked.telemetry.channels | {"on_time_Y1": on}), CASSINI)
+    assert any("thrusters fire at 799-812 s" in d for d in told.doubts) and told.settings["arcs"] == 2
+    for result in (untold, told):
+        assert np.abs(pulls(result, kicked.inertia_kgm2)).max() < 4.5
+
+
+def test_trap_a_whiff_of_a_thruster_that_no_channel_tells_of_is_found():
+    """0.02 N m s of 15 that move: 2 % of conservation do not see it, and left in it moves Ixx by ten sigmas."""
+    kick = {"shape": "table", "axis": "x", "times": "800 800.5 801.5 802 s", "torques": "0 0.02 0.02 0 N m"}
+    kicked = fly("slews", seed=5, torques=[kick])
+    result = inertia_tensor(kicked.telemetry, CASSINI)
+    (said,) = [d for d in result.doubts if "momentum steps near" in d]
+    assert abs(float(said.split()[4]) - 801) <= 6 and result.settings["arcs"] == 2
+    assert np.abs(pulls(result, kicked.inertia_kgm2)).max() < 4
+
+
+def test_trap_a_gap_in_a_slew():
+    cut = flight().telemetry.epoch_ns + NS * np.array([100, 250])
+    gap = changed(flight().telemetry, "wheel_rate", lambda c: c.where((c.tai_ns < cut[0]) | (c.tai_ns > cut[1])))
+    result = inertia_tensor(gap, CASSINI)
+    assert np.abs(pulls(result, flight().inertia_kgm2)).max() < 4
+    assert result.sigma_random[0, 0] > fitted().sigma_random[0, 0]
+
+
+def test_trap_one_axis_two_axes_one_skew_axis():
+    tlm, truth = flight().telemetry, flight().inertia_kgm2
+    one = inertia_tensor(tlm.between(0, 560), CASSINI)
+    assert one.excitation.rank == 3 and one.excitation.untold == ("Iyy", "Iyz", "Izz")
+    assert one.sigma_random[1, 1] == pytest.approx(0.1 * CASSINI.at(tlm.epoch_ns).inertia_kgm2[1, 1], rel=0.05)
+    assert abs(one.inertia[0, 0] - truth[0, 0]) < 4 * one.sigma_random[0, 0] < 4
+    assert any("leans on" in d or "taken from the craft's own tensor" in d for d in one.doubts)
+    assert inertia_tensor(tlm.between(0, 1130), CASSINI).excitation.rank == 5
+    skew = inertia_tensor(tlm.between(1690, 2400), CASSINI, method="all")
+    assert skew.excitation.rank == 3
+    axis = np.ones(3) / np.sqrt(3)
+    assert axis @ skew.inertia @ axis == pytest.approx(axis @ truth @ axis, rel=0.01)
+
+
+def test_trap_wheels_taken_for_each_other_between_slews():
+    tlm = flight().telemetry
+    one, two = tlm.channel("wheel_rate_RWA1"), tlm.channel("wheel_rate_RWA2")
+    after = one.tai_ns > tlm.epoch_ns + 1150 * NS
+    swapped = {
+        "wheel_rate_RWA1": replace(one, values=np.where(after, two.values, one.values)),
+        "wheel_rate_RWA2": replace(two, values=np.where(after, one.values, two.values)),
+    }
+    with pytest.raises(BadInput, match="RWA1 and RWA2 were mistaken for each other from 1"):
+        inertia_tensor(replace(tlm, channels=tlm.channels | swapped), CASSINI)
+
+
+@pytest.mark.slow
+def test_trap_a_wheel_replaced_on_its_date():
+    """The set of wheels changes with the craft's dates: momentum begins anew, both spans are used."""
+    tlm = flight().telemetry
+    switch = tlm.epoch_ns + 1150 * NS
+    c = tlm.channel("wheel_rate_RWA4")
+    old = replace(c.where(c.tai_ns < switch), name="wheel_rate_RWA3")
+    new = c.where(c.tai_ns >= switch)
+    channels = {n: x for n, x in tlm.channels.items() if n != "wheel_rate_RWA4"}
+    both = replace(tlm, channels=channels | {"wheel_rate_RWA3": old, "wheel_rate_RWA4": new})
+    dates = {"RWA3": {"valid_to": switch}, "RWA4": {"valid_from": switch}}
+    wheels = tuple(w.model_copy(update=dates.get(w.name, {})) for w in CASSINI.wheels)
+    result = inertia_tensor(both, CASSINI.model_copy(update={"wheels": wheels}))
+    assert result.excitation.rank == 6 and result.settings["arcs"] == 2
+    assert np.abs(pulls(result, flight().inertia_kgm2)).max() < 4
+    silent = inertia_tensor(both, CASSINI)  # with the craft's own dates RWA4 is silent for half the record
+    assert any("no rate of RWA4 is known" in d for d in silent.doubts) and silent.excitation.rank == 5
+
+
+def test_trap_nothing_to_learn_from_a_hold():
+    with pytest.raises(BadInput, match="hardly turns"):
+        inertia_tensor(fly("quiet", duration="400 s").telemetry, CASSINI)
+    bare = without(without(flight().telemetry, "quaternion"), "body_rate")
+    with pytest.raises(BadInput, match="how the body turned is not known"):
+        inertia_tensor(bare, CASSINI)
+    with pytest.raises(BadInput, match="no inertia method"):
+        inertia_tensor(flight().telemetry, CASSINI, method="best")
+
+
+# ---- the program, the store, real recordings ------------------------------------------------------------------
+
+
+def test_golden_keys_of_the_record(tmp_path):
+    write_table(flight().telemetry, tmp_path / "slews.csv")
+    answer = run("inertia", tmp_path / "slews.csv", "--json", "--plot", tmp_path / "slews.png")
+    assert answer.code == 0, answer.err
+    record = json.loads(answer.out)
+    assert {"command", "method", "inertia_kgm2", "sigma_random_kgm2", "sigma_systematic_kgm2", "rank", "singular_values",
+            "external_torque_Nm", "external_torque_sigma_Nm", "residual_rms_Nms", "slews", "doubts", "provenance"} <= set(record)  # fmt: skip
+    assert record["method"] == "consistent" and record["rank"] == 6 and len(record["slews"]) == 4
+    assert np.shape(record["inertia_kgm2"]) == (3, 3) and (tmp_path / "slews.png").stat().st_size > 20_000
+    assert "no inertia method" in complaint("inertia", tmp_path / "slews.csv", "--method", "best")
+    assert "scale error" in complaint("inertia", tmp_path / "slews.csv", "--wheel-error", "3")
+
+
+def test_law_the_entry_of_the_store_holds_all_elements_with_total_sigma():
+    entry = inertia_entry(fitted(), flight().telemetry, CASSINI, None, {})
+    assert entry.kind == "inertia" and entry.event == "inertia-2005-02-09"
+    kept = entry.value("Iyy", "telemetry")
+    assert (kept.value, kept.sigma) == pytest.approx((fitted().inertia[1, 1], fitted().sigma_total[1, 1]))
+    assert entry.value("external_torque_y", "telemetry").unit == "N m"
+
+
+def test_inspiresat1_by_kicks_of_its_wheels():
+    craft = load_craft("inspiresat1")
+    tlm = load_telemetry(flight_data("inspiresat1/is1_adcs_1hz.csv"), channels=ROOT / "examples" / "inspiresat1.toml")
+    result = inertia_tensor(tlm, craft)
+    assert result.relative and result.record()["inertia_kgm2"] is None
+    assert result.excitation.untold == ("Izz",)
+    x, y = result.inertia[0, 0], result.inertia[1, 1]
+    assert 3850 < x < 4700 and 5000 < y < 6200  # ratios to a wheel's spin inertia
+    assert np.all(np.diag(result.sigma_random)[:2] < [250, 300])
+
+
+def test_iss_says_what_it_cannot_tell():
+    tlm = load_telemetry(flight_data("iss/iss_20181012_hours_00_12.csv.gz"), channels=ROOT / "examples" / "iss.toml")
+    result = inertia_tensor(tlm, load_craft("iss"))
+    assert {"Ixx", "Iyy", "Izz"} <= set(result.excitation.untold)
+    assert any("the data alone do not tell" in d for d in result.doubts)
