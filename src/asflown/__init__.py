@@ -20,7 +20,7 @@ _PUBLIC = {
     "TorqueResult": "asflown.estimate.torque",
     "compare_torques": "asflown.estimate.torque",
     "external_torque": "asflown.estimate.external",
-    "ExternalTorque": "asflown.estimate.external",
+    "ExternalTorqueResult": "asflown.estimate.external",
     "density": "asflown.estimate.density",
     "DensityResult": "asflown.estimate.density",
     "jets": "asflown.estimate.jets",
@@ -73,7 +73,7 @@ if TYPE_CHECKING:
     from asflown.craft.load import built_in_crafts, load_craft
     from asflown.craft.model import Craft
     from asflown.estimate.density import DensityResult, density
-    from asflown.estimate.external import ExternalTorque, external_torque
+    from asflown.estimate.external import ExternalTorqueResult, external_torque
     from asflown.estimate.gates import GatesFit, fit_gates, judge_gates, watch_maneuvers
     from asflown.estimate.inertia import InertiaResult, inertia_tensor
     from asflown.estimate.jets import JetsResult, jets

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from asflown import load_craft
 from asflown.campaigns.budget import error_budget, of_rise, split_method
 from asflown.kit.errors import BadInput
-
-CASSINI = load_craft("cassini")
+from flights import CASSINI
 
 
 @pytest.mark.slow

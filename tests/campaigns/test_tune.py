@@ -2,21 +2,21 @@
 
 import pytest
 
-from asflown import load_craft
 from asflown.campaigns.tune import remarks, tune
 from asflown.kit.errors import BadInput
+from flights import CASSINI
 
 
 def test_published_smoothing_alone_at_eight_percent():
     """Recomputed from 000: with I w put back, 8 % takes 8.8 % off 30-s peaks and 17.6 % off 15-s ones."""
-    (row,) = tune(load_craft("cassini"), spans=[0.08])
+    (row,) = tune(CASSINI, spans=[0.08])
     assert row.samples == (39, 39)
     assert row.smoothing_percent == pytest.approx([-8.8, -17.6], abs=0.2)  # percent
     assert row.peak_error_percent == pytest.approx([2.2, 6.2], abs=0.4)
 
 
 def test_law_a_wider_span_takes_more_off():
-    rows = tune(load_craft("cassini"), spans=[0.04, 0.08, 0.12], rises=[15.0])
+    rows = tune(CASSINI, spans=[0.04, 0.08, 0.12], rises=[15.0])
     errors = [r.peak_error_percent[0] for r in rows]
     assert errors[0] > errors[1] > errors[2]
     assert all(r.smoothing_percent[0] < r.peak_error_percent[0] for r in rows)
@@ -25,12 +25,12 @@ def test_law_a_wider_span_takes_more_off():
 def test_impossible_spans_are_refused():
     for bad in ([], [0.0], [0.6]):
         with pytest.raises(BadInput, match="span"):
-            tune(load_craft("cassini"), spans=bad)
+            tune(CASSINI, spans=bad)
 
 
 def test_published_choice_is_not_the_least_error_and_the_search_says_so():
     """000 settled on 8 % for a small error "without overly damping": the least error is at 10 %."""
-    rows = tune(load_craft("cassini"), spans=[0.04, 0.08, 0.10])
+    rows = tune(CASSINI, spans=[0.04, 0.08, 0.10])
     assert min(rows, key=lambda r: r.worst_percent).span == 0.10
     assert any("settled on 8 %, not on 10 %" in d for d in remarks(rows))
     assert not any("settled" in d for d in remarks(rows[:2]))
@@ -39,4 +39,4 @@ def test_published_choice_is_not_the_least_error_and_the_search_says_so():
 @pytest.mark.parametrize("rise", [0.0, -5.0, float("nan")])
 def test_impossible_rises_are_refused(rise):
     with pytest.raises(BadInput, match="not possible"):
-        tune(load_craft("cassini"), spans=[0.08], rises=[rise])
+        tune(CASSINI, spans=[0.08], rises=[rise])

@@ -89,6 +89,8 @@ def csv_text(table: dict, epoch: str | None = "2015-09-29T00:00:00 UTC") -> str:
     """A self-describing table; NaN is written as a blank."""
     lines = [] if epoch is None else [f"# epoch: {epoch}"]
     lines.append(",".join(table))
-    for row in zip(*table.values(), strict=True):
-        lines.append(",".join(v if isinstance(v, str) else "" if math.isnan(v) else repr(float(v)) for v in row))
+    lines += [
+        ",".join(v if isinstance(v, str) else "" if math.isnan(v) else repr(float(v)) for v in row)
+        for row in zip(*table.values(), strict=True)
+    ]
     return "\n".join(lines) + "\n"

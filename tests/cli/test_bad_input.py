@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from asflown.kit.rotations import rotation
-from asflown.sim.flight.closed_loop import fly
-from asflown.telemetry.tables import write_table
 from cli.program import complaint, csv_text, flight, run
+from flights import flown, saved, scaled, written
 
 GOOD = csv_text(flight())
 LINES = GOOD.splitlines()  # comment, header, then a row each 4 s
@@ -90,12 +89,6 @@ TABLES = {
     "a very long name": (renamed("body_rate_x", "x" * 5000), ["Rename"]),
     "very many unknown channels": (lines(",".join(["time [s]", *(f"bad_{i} [s]" for i in range(4000))]), "0" + ",0" * 4000), ["bad_0"]),
 }  # fmt: skip
-
-
-def written(folder: Path, content, name: str = "t.csv") -> Path:
-    path = folder / name
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return path
 
 
 @pytest.fixture
@@ -376,34 +369,25 @@ def test_usage():
 # ---- what is refused or doubted only because of what the data say ----------------------------------
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def slew():
     """A flight with a slew, cut short."""
-    return fly("slews", duration="420 s").telemetry
+    return flown("slews", duration="420 s").telemetry
 
 
 def test_a_quaternion_of_the_wrong_direction_is_refused_in_a_slew(slew, tmp_path):
-    write_table(slew, tmp_path / "right.csv")
-    assert run("telemetry", "check", tmp_path / "right.csv").code == 0
-    for name in ("quaternion_x", "quaternion_y", "quaternion_z"):
-        slew.channels[name].values[:] *= -1
-    write_table(slew, tmp_path / "wrong.csv")
-    for name in ("quaternion_x", "quaternion_y", "quaternion_z"):
-        slew.channels[name].values[:] *= -1
+    assert run("telemetry", "check", saved(slew, tmp_path, "right.csv")).code == 0
+    wrong = saved(scaled(scaled(slew, "quaternion", -1), "quaternion_w", -1), tmp_path, "wrong.csv")
     for verb in (["torque"], ["telemetry", "check"], ["torque", "--json"]):
-        said = complaint(*verb, tmp_path / "wrong.csv")
+        said = complaint(*verb, wrong)
         assert "conjugate" in said and "wrong.csv" in said and "negate" in said
 
 
 def test_q_and_minus_q_are_the_same_attitude(slew, tmp_path):
     q = np.stack([slew.channels[f"quaternion_{m}"].values for m in "wxyz"], axis=1)
     assert np.allclose(rotation(q).as_matrix(), rotation(-q).as_matrix())
-    for m in "wxyz":
-        slew.channels[f"quaternion_{m}"].values[::2] *= -1
-    write_table(slew, tmp_path / "q.csv")
-    for m in "wxyz":
-        slew.channels[f"quaternion_{m}"].values[::2] *= -1
-    done = run("torque", tmp_path / "q.csv")
+    flipped = scaled(slew, "quaternion", np.where(np.arange(len(q)) % 2 == 0, -1, 1))
+    done = run("torque", saved(flipped, tmp_path))
     assert done.code == 0 and "quaternion" not in done.out
 
 

@@ -12,7 +12,7 @@ from asflown.kit.timeline import gps_to_tai_ns, utc_label, utc_to_tai_ns
 from asflown.telemetry.load import load_telemetry
 from asflown.telemetry.tables import read_csv, write_table
 from cli.program import T, csv_text, flight, run
-from cli.test_bad_input import written
+from flights import flown, saved, written
 
 KEYS = {"command", "craft", "method", "variant", "axis", "epoch", "time_s", "torque_Nm", "sigma_Nm", "momentum_Nms",
         "peaks", "doubts", "provenance"}  # fmt: skip
@@ -287,12 +287,10 @@ def test_a_dead_sensor_is_told(tmp_path):
 
 def test_recovery_a_slew_without_a_torque_shows_none_and_accuses_no_sign(tmp_path):
     """Wheels and body trade 15 N m s in a slew; smoothed unlike each other they left 25 mN m at its corners."""
-    from asflown.sim.flight.closed_loop import fly
-
-    write_table(fly("slews", duration="420 s", seed=3).telemetry, tmp_path / "slew.csv")
-    record = torque(tmp_path / "slew.csv")
+    path = saved(flown("slews", duration="420 s", seed=3).telemetry, tmp_path)
+    record = torque(path)
     pulls = finite(record["torque_Nm"]) / finite(record["sigma_Nm"])
     assert np.abs(pulls).max() < 8
     assert np.sqrt(np.mean(pulls**2)) < 1.5
     assert not any("sign" in d for d in record["doubts"])
-    assert np.isfinite(finite(torque(tmp_path / "slew.csv", "--method", "transfer")["torque_Nm"])).all()
+    assert np.isfinite(finite(torque(path, "--method", "transfer")["torque_Nm"])).all()

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from asflown.trends.store.store import TrendStore
+from flights import flown, saved
 from trends.histories import history
 
 from .program import run
@@ -33,12 +34,10 @@ def alarming(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def flown(tmp_path_factory):
+def added(tmp_path_factory):
     """A list of two actuations, one flown, and the store they were added to."""
-    from asflown import fly, write_table
-
     folder = tmp_path_factory.mktemp("flown")
-    write_table(fly("cover-deploy", seed=2).telemetry, folder / "flight.csv")
+    saved(flown("cover-deploy", seed=2).telemetry, folder, "flight.csv")
     (folder / "events.toml").write_text(
         '[[event]]\nid = "one"\nkind = "deploy"\nfile = "flight.csv"\nmotor_on_s = 60\nmotor_off_s = 420\n\n'
         '[[event]]\nid = "before"\nkind = "stow"\ndate = "2015-07-14"\n'
@@ -48,8 +47,8 @@ def flown(tmp_path_factory):
     )
 
 
-def test_add_keeps_and_says_what(flown):
-    folder, done = flown
+def test_add_keeps_and_says_what(added):
+    folder, done = added
     assert done.code == 0, done.err
     added = {a["event"]: a for a in done.record["added"]}
     assert added["one"]["revision"] == 1 and added["one"]["figures"] > 20 and added["before"]["figures"] == 0
@@ -118,8 +117,8 @@ def test_compare_finds_the_pairs_and_any_two(store):
     assert run("trend", "compare", "--store", store).out.count("cold deploy-") == 3
 
 
-def test_wheels_are_kept_beside_actuations(flown):
-    folder, _ = flown
+def test_wheels_are_kept_beside_actuations(added):
+    folder, _ = added
     done = run("wheels", folder / "flight.csv", "--store", folder / "t.db", "--json")
     assert done.code == 0 and done.record["command"] == "wheels" and "kept as wheels-2015-09-29, revision 1" in done.err
     shown = run(

@@ -6,8 +6,7 @@ import pytest
 from asflown.craft.load import built_in_crafts, load_craft
 from asflown.kit.errors import BadInput
 from asflown.kit.timeline import utc_to_tai_ns
-
-CASSINI = load_craft("cassini")
+from flights import CASSINI
 
 
 def on(date):
@@ -137,10 +136,9 @@ def test_an_unknown_craft_names_the_known_ones():
 
 def test_thrust_falls_with_the_tank_and_steps_at_its_recharge():
     """001 section V: 0.97 N at launch, 0.75 and 0.69 N at Saturn; the tank was to be recharged in April 2006."""
-    cassini = load_craft("cassini")
 
     def at(date: str) -> float:
-        return cassini.thrust_at(int(utc_to_tai_ns(date)))
+        return CASSINI.thrust_at(int(utc_to_tai_ns(date)))
 
     assert [at("1997-01-01"), at("2004-06-30"), at("2005-01-14")] == [0.97, 0.75, 0.69]
     assert 0.75 < at("2001-01-01") < 0.97

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from asflown.craft.load import load_craft
 from asflown.dynamics.loop import (
     denominator,
     error_per_torque,
@@ -14,8 +13,9 @@ from asflown.dynamics.loop import (
     low_order,
     wheel_momentum_rate_per_torque,
 )
+from flights import CASSINI
 
-K = load_craft("cassini").wheel_controller
+K = CASSINI.wheel_controller
 
 
 def at(poly, f_hz):

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 
-from asflown.craft.load import load_craft
 from asflown.dynamics.drag import PRINTED_E3, arm, torque_per_density
 from asflown.dynamics.environment import gravity_gradient, gravity_gradient_bound, magnetic_torque_bound
 from asflown.dynamics.flyby import enceladus, flyby_called, flybys, published_peaks, tables
@@ -28,10 +27,10 @@ from asflown.dynamics.plume import (
 from asflown.kit.errors import BadInput
 from asflown.kit.quantities import quantity
 from asflown.kit.timeline import utc_to_tai_ns
+from flights import CASSINI
 
 E3 = flyby_called("E3")
 JETS = {j.name: j for j in published_jets()}
-CASSINI = load_craft("cassini")
 I_B = CASSINI.at(int(utc_to_tai_ns("2008-03-12T00:00:00"))).inertia_kgm2
 T = np.arange(10, 130, 0.05)
 

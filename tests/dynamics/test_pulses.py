@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from asflown.craft.load import load_craft
 from asflown.dynamics.pulses import Valve, expected_effective, moment_matrix
+from flights import CASSINI
 
 V65, V40 = Valve(0.005, 0.020, 0.065), Valve(0.005, 0.020, 0.040)
 #: 001 section V: pulses of its simulated wheel biasing, 21.875 s together. [s], number
@@ -82,7 +82,7 @@ def test_published_moment_matrix():
         [x - ex, -(x + ex), -(x + ex), x - ex, 0, 0, 0, 0],
         [0, 0, 0, 0, -(x - ex), x + ex, -x - ex, x - ex],
     ]
-    thrusters = load_craft("cassini").thrusters
+    thrusters = CASSINI.thrusters
     Q = moment_matrix([t.position for t in thrusters], [t.direction for t in thrusters], (ex, ey, ez))
     assert Q == pytest.approx(np.array(printed), abs=1e-12)
     signs = {t.name: "".join("-0+"[int(np.sign(q)) + 1] for q in col) for t, col in zip(thrusters, Q.T, strict=True)}

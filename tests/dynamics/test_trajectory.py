@@ -14,9 +14,9 @@ from asflown.kit.errors import BadInput
 from asflown.kit.timeline import et_to_tai_ns, utc_to_tai_ns
 from asflown.sim.flight.closed_loop import fly
 from asflown.telemetry.kernels import trajectory_from_kernels
-from asflown.telemetry.tables import write_table
 from asflown.telemetry.trajectory import load_trajectory
 from cli.program import complaint, run
+from flights import saved
 
 E3 = flyby_called("E3")
 T = np.arange(-100.0, 161.0, 10.0)
@@ -136,7 +136,7 @@ def test_what_a_path_is_refused_for():
 
 def test_the_verbs_follow_a_trajectory(tmp_path):
     flight = fly("e3", noise="half", seed=2)
-    write_table(flight.telemetry, tmp_path / "e3.csv")
+    saved(flight.telemetry, tmp_path, "e3.csv")
     (tmp_path / "t.csv").write_text(table())
     words = (
         "density",

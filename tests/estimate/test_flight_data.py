@@ -1,7 +1,6 @@
 """Real recordings: what they show must not depend on who looks.  Skipped where they are not there."""
 
 import sys
-from functools import cache
 
 import numpy as np
 import pytest
@@ -16,22 +15,11 @@ from asflown.estimate.fused.series import BODY_RATE, MOMENTUM
 from asflown.estimate.subject.subject import subject_of
 from asflown.estimate.torque.reconstruct import disturbance_torque
 from asflown.estimate.torque.table import save_csv
-from asflown.telemetry.load import load_telemetry
 from asflown.telemetry.screening import gaps
-from conftest import ROOT, flight_data
+from conftest import ROOT
+from flights import inspiresat1, iss
 
 sys.path.insert(0, str(ROOT / "studies"))
-
-
-@cache
-def inspiresat1():
-    return load_telemetry(flight_data("inspiresat1/is1_adcs_1hz.csv"), channels=ROOT / "examples" / "inspiresat1.toml")
-
-
-@cache
-def iss():
-    path = flight_data("iss/iss_20181012_hours_00_12.csv.gz")
-    return load_telemetry(path, channels=ROOT / "examples" / "iss.toml")
 
 
 def wheels_and_body(telemetry):

@@ -16,16 +16,12 @@ from asflown.maneuvers.frame import resolved, tvc_axes
 from asflown.maneuvers.history import past_model
 from asflown.maneuvers.table import load_maneuvers
 from asflown.maneuvers.write import maneuver_text
+from flights import written
 
 from .sample import HEAD, maneuvers
 
 ROW = "A,2012-01-02T00:00:00,rcs,0.1,1,2,-3,0.2,0.3,0.4,0.5"
 RCS = past_model("rcs/2012-1").model
-
-
-def written(folder, text, name="m.csv"):
-    (folder / name).write_text(text)
-    return folder / name
 
 
 def lines(*rows) -> str:
@@ -55,7 +51,7 @@ def test_the_same_table_from_parquet_toml_and_gzip(tmp_path):
     import duckdb
 
     m = maneuvers(RCS, [0.02, 0.1, 0.3], 1e-4)
-    plain = load_maneuvers(written(tmp_path, maneuver_text(m)))
+    plain = load_maneuvers(written(tmp_path, maneuver_text(m), "m.csv"))
     (tmp_path / "m.csv.gz").write_bytes(gzip.compress(maneuver_text(m).encode()))
     with duckdb.connect() as db:
         db.execute(
@@ -106,7 +102,7 @@ BAD = {
 def test_a_bad_table_is_refused_with_its_place(case, tmp_path):
     text, wanted = BAD[case]
     with pytest.raises(BadInput) as why:
-        load_maneuvers(written(tmp_path, text))
+        load_maneuvers(written(tmp_path, text, "m.csv"))
     assert "m.csv" in str(why.value) and why.value.remedy
     for word in wanted:
         assert word in str(why.value)

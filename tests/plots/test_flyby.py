@@ -5,22 +5,20 @@ from functools import cache
 import numpy as np
 import pytest
 
-from asflown.craft.load import load_craft
 from asflown.dynamics.flyby import flyby_called
 from asflown.estimate.density.along_flyby import density
 from asflown.estimate.jets.fit import jets
 from asflown.plots.figure import new_figure, save_figures
 from asflown.plots.flyby import draw_from_pole, draw_geometry, flyby_figures
-from asflown.sim.flight.closed_loop import fly
 from cli.program import complaint, run
+from flights import CASSINI, flown
 
-CASSINI = load_craft("cassini")
 ALWAYS = {"attitude-error", "rate-error", "body-rate", "torque", "momentum", "density"}
 
 
 @cache
 def met(scenario="e3", closest_s=180.0, **how):
-    f = fly(scenario, seed=3)
+    f = flown(scenario, seed=3)
     return f.telemetry, density(f.telemetry, CASSINI, f.met.flyby.name, closest_s, method="momentum", **how)
 
 

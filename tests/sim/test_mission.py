@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asflown.craft.load import load_craft
 from asflown.kit.errors import BadInput
 from asflown.sim.flight.closed_loop import fly
 from asflown.sim.flight.cover import momentum_per_rate, moving_part
@@ -18,6 +17,7 @@ from asflown.sim.mission.flown import fly_mission, line_at, plan_mission
 from asflown.sim.mission.mission import is_mission, load_mission, shipped_missions
 from asflown.sim.scenario.scenario import load_scenario
 from asflown.trends.entries.events import load_events
+from flights import CASSINI
 
 SHIPPED = Path(mission.__file__).parents[1] / "missions" / "cassini-mission.toml"
 
@@ -48,13 +48,8 @@ def mission():
 
 
 @pytest.fixture(scope="module")
-def cassini():
-    return load_craft("cassini")
-
-
-@pytest.fixture(scope="module")
-def planned(mission, cassini):
-    return plan_mission(mission, cassini)
+def planned(mission):
+    return plan_mission(mission, CASSINI)
 
 
 def short(mission, *names, **changes):
@@ -141,12 +136,12 @@ def test_law_true_figures_are_the_wanted_ones(written):
         assert 0.25 < abs(e["true"]["peak_momentum_Nms"]) < 0.36
 
 
-def test_law_the_true_line_is_the_declared_one_without_scatter(mission, cassini):
+def test_law_the_true_line_is_the_declared_one_without_scatter(mission):
     """Every motion's own torque, not what was wanted of it: +30 % and -33 %, straight."""
     from asflown.sim.mission.ageing import true_figures
 
-    plan = [p for p in plan_mission(mission.changed(scatter=EXACT), cassini) if p.event.kind == "deploy"]
-    true = np.array([three(true_figures(p.scenario.cover, cassini.at(p.event.tai_ns))) for p in plan])
+    plan = [p for p in plan_mission(mission.changed(scatter=EXACT), CASSINI) if p.event.kind == "deploy"]
+    true = np.array([three(true_figures(p.scenario.cover, CASSINI.at(p.event.tai_ns))) for p in plan])
     day = np.array([p.event.tai_ns / 86_400e9 for p in plan])
     for column, change in zip(true.T, (30, -33, -33), strict=True):
         slope, at_first = np.polyfit(day - day[0], column, 1)
@@ -163,12 +158,12 @@ def test_law_all_is_internal_and_the_travel_is_whole(planned):
     assert np.trapezoid(truth.torque_Nm[:, 1], truth.time_s) == pytest.approx(0, abs=1e-4)
 
 
-def test_law_momentum_per_rate_is_the_plants(cassini):
+def test_law_momentum_per_rate_is_the_plants():
     from asflown.sim.flight.closed_loop import _plant
     from asflown.sim.flight.plant import moving_part_history, moving_part_motion
 
     scenario = load_scenario("cover-stow")
-    now = cassini.at(scenario.epoch_ns)
+    now = CASSINI.at(scenario.epoch_ns)
     part = moving_part(scenario.cover, now)
     plant, times = _plant(scenario, now, part), np.array([90.0, 150.3, 230.7])
     angle, momentum, _ = moving_part_history(times, np.zeros((3, 3)), plant)
@@ -207,13 +202,13 @@ def test_the_same_seed_gives_the_same_files_and_no_event_changes_another(written
     assert (tmp_path / "a" / name).read_bytes() != (folder / name).read_bytes()
 
 
-def test_faults_and_cold_starts_change_what_they_name(mission, cassini):
+def test_faults_and_cold_starts_change_what_they_name(mission):
     hurt = mission.changed(
         scatter=EXACT,
         cold={"excursion_factor": 1.1},
         faults=[{"since": "stow-2012-05-20", "kind": "deploy", "impulse_factor": 0.8}],
     )
-    plan = {p.event.name: p for p in plan_mission(hurt, cassini)}
+    plan = {p.event.name: p for p in plan_mission(hurt, CASSINI)}
     by = {name: three(p.wanted) / three(p.line) for name, p in plan.items()}
     assert by["deploy-2011-09-10"] == pytest.approx([1, 1.1, 1.1])  # after 242 days, before the fault
     assert by["deploy-2012-10-12"] == pytest.approx([0.8, 1, 1])

@@ -5,15 +5,14 @@ import json
 import numpy as np
 import pytest
 
-from asflown.craft.load import load_craft
 from asflown.dynamics.environment import gravity_gradient, gravity_gradient_bound
 from asflown.kit.errors import BadInput
 from asflown.sim.flight.closed_loop import fly
 from asflown.sim.flight.passage import passed
 from asflown.sim.scenario.scenario import load_scenario
 from cli.program import complaint, run
+from flights import CASSINI
 
-CASSINI = load_craft("cassini")
 JETS = ("Alexandria", "Cairo", "Damascus")
 
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from asflown.craft.load import load_craft
 from asflown.craft.model import Pendulum
 from asflown.kit.errors import BadInput
 from asflown.kit.rotations import rotation
 from asflown.sim.flight.closed_loop import fly
 from asflown.sim.flight.modes import pendulum_coupling
 from asflown.sim.flight.plant import Plant, advance
+from flights import CASSINI
 
 
 @pytest.mark.parametrize("name", ["slews-axes", "slews-multi"])
@@ -143,7 +143,6 @@ def test_slosh_needs_a_mass_and_fits_into_the_craft():
         fly("quiet", slosh=True, duration="10 s")
     with pytest.raises(BadInput, match="weighs less"):
         fly("slews-axes", slosh=True, craft_mass="50 kg")
-    craft = load_craft("cassini")
-    heavy = tuple(p.model_copy(update={"pivot": (0.0, 0.0, 20.0)}) for p in craft.slosh)
+    heavy = tuple(p.model_copy(update={"pivot": (0.0, 0.0, 20.0)}) for p in CASSINI.slosh)
     with pytest.raises(BadInput, match="more inertia"):
-        fly("slews-axes", slosh=True, craft=craft.model_copy(update={"slosh": heavy}))
+        fly("slews-axes", slosh=True, craft=CASSINI.model_copy(update={"slosh": heavy}))

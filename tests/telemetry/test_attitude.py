@@ -10,15 +10,12 @@ from asflown.telemetry.attitude import check_attitude
 from asflown.telemetry.load import load_telemetry
 from asflown.telemetry.screening import screen
 from conftest import flight_data
-from telemetry.flights import noise, slewing, telemetry_of
+from flights import changed, scaled, telemetry_of
+from telemetry.signals import noise, slewing
 
 
 def conjugated(t):
-    vector = {
-        n: replace(t.channels[n], values=-t.channels[n].values)
-        for n in ("quaternion_x", "quaternion_y", "quaternion_z")
-    }
-    return replace(t, channels=t.channels | vector)
+    return changed(t, "quaternion", lambda c: c if c.member == "w" else replace(c, values=-c.values))
 
 
 def test_right_direction_in_a_slew_is_confirmed_and_the_wrong_one_refused():
@@ -29,18 +26,7 @@ def test_right_direction_in_a_slew_is_confirmed_and_the_wrong_one_refused():
 
 
 def test_a_change_of_sign_is_no_change_of_direction():
-    t = slewing()
-    flip = np.where(np.arange(240) % 7 < 3, -1.0, 1.0)
-    t = replace(
-        t,
-        channels=t.channels
-        | {
-            f"quaternion_{m}": replace(
-                t.channels[f"quaternion_{m}"], values=flip * t.channels[f"quaternion_{m}"].values
-            )
-            for m in "wxyz"
-        },
-    )
+    t = scaled(slewing(), "quaternion", np.where(np.arange(240) % 7 < 3, -1.0, 1.0))
     assert check_attitude(t).doubts == ()
     with pytest.raises(BadInput):
         check_attitude(conjugated(t))
@@ -86,7 +72,5 @@ def test_runs_of_another_simulator_pass_unharmed(run):
 def test_attitude_error_in_mrad_labelled_rad_is_doubted(run):
     t = load_telemetry(flight_data(f"simulated/{run}.csv.gz"))
     for factor, doubted in ((1.0, False), (180 / np.pi, True), (1e3, True)):
-        names = [f"attitude_error_{a}" for a in "xyz"]
-        scaled = {n: replace(t.channels[n], values=factor * t.channels[n].values) for n in names}
-        doubts = check_attitude(replace(t, channels=t.channels | scaled, doubts=())).doubts
+        doubts = check_attitude(replace(scaled(t, "attitude_error", factor), doubts=())).doubts
         assert any(d.startswith("attitude_error_x") for d in doubts) == doubted

@@ -10,11 +10,8 @@ from asflown.cli.telemetry import app
 from asflown.kit.errors import BadInput
 from asflown.kit.rotations import rates_between
 from asflown.telemetry.attitude import together
-from asflown.telemetry.load import load_telemetry
-from asflown.telemetry.tables import write_table
-from conftest import ROOT, flight_data
-from telemetry.flights import noise, telemetry_of
-from telemetry.test_tables import written
+from flights import inspiresat1, iss, saved, telemetry_of, written
+from telemetry.signals import noise
 
 T = np.arange(0.0, 1000.0, 2.0)
 
@@ -28,11 +25,8 @@ def table(tmp_path):
     x = np.rint(noise(500, 1e-5) / 1e-7) * 1e-7
     keep = np.ones(500, bool)
     keep[100:120] = False
-    write_table(
-        telemetry_of(body_rate_x=(T[keep], x[keep]), control_mode=(T[:3], np.array(["A", "A", "B"]))),
-        tmp_path / "t.csv",
-    )
-    return tmp_path / "t.csv"
+    tlm = telemetry_of(body_rate_x=(T[keep], x[keep]), control_mode=(T[:3], np.array(["A", "A", "B"])))
+    return saved(tlm, tmp_path)
 
 
 def test_check_prints_a_line_a_channel(table):
@@ -62,12 +56,11 @@ def test_check_window_exclusion_and_exit_codes(table, tmp_path):
     assert record["channels"][0]["samples"] == 51 and record["channels"][0]["unused"] == 26
     x = noise(500, 1e-5)
     x[200] = 0.1
-    write_table(telemetry_of(body_rate_x=(T, x)), tmp_path / "spike.csv")
-    r = run("check", tmp_path / "spike.csv")
+    r = run("check", saved(telemetry_of(body_rate_x=(T, x)), tmp_path, "spike.csv"))
     assert r.exit_code == 3 and "spike 1" in r.stdout
-    write_table(telemetry_of(wheel_rate_RWA1=(T, 600 + noise(500))), tmp_path / "rpm.csv")
-    assert run("check", tmp_path / "rpm.csv").exit_code == 0
-    r = run("check", tmp_path / "rpm.csv", "--craft", "cassini")
+    rpm = saved(telemetry_of(wheel_rate_RWA1=(T, 600 + noise(500))), tmp_path, "rpm.csv")
+    assert run("check", rpm).exit_code == 0
+    r = run("check", rpm, "--craft", "cassini")
     assert r.exit_code == 3 and "DOUBT  wheel_rate_RWA1" in r.stdout
     assert isinstance(run("check", tmp_path / "none.csv").exception, BadInput)
 
@@ -81,19 +74,15 @@ def test_names_lists_every_kind():
 
 
 def test_real_inspiresat1_comes_in_clean():
-    t = load_telemetry(flight_data("inspiresat1/is1_adcs_1hz.csv"), channels=ROOT / "examples" / "inspiresat1.toml")
+    t = inspiresat1()
     assert t.members("wheel_rate") == ["1", "2", "3"] and t.has_axes("body_rate")
     assert t.epoch_label.startswith("2023-08-11") and t.doubts == ()
     assert all(len(c.values) == 476 and c.valid.all() for c in t.channels.values())  # kicks of sticking wheels stay
     assert np.median(t.channel("body_rate_z").values) == pytest.approx(-0.007, abs=2e-4)  # rad/s, its README
 
 
-@pytest.fixture(scope="module")
-def station():
-    return load_telemetry(flight_data("iss/iss_20181012_hours_00_12.csv.gz"), channels=ROOT / "examples" / "iss.toml")
-
-
-def test_real_iss_attitude_turns_as_its_gyros_say(station):
+def test_real_iss_attitude_turns_as_its_gyros_say():
+    station = iss()
     assert station.epoch_label == "2018-10-12T04:59:15 UTC" and station.doubts == ()
     at, q = together(station, [f"quaternion_{m}" for m in "wxyz"])
     mid, rate = rates_between((at - at[0]) / 1e9, q)
@@ -103,7 +92,8 @@ def test_real_iss_attitude_turns_as_its_gyros_say(station):
     assert np.median(np.abs(rate[inside, 1] - there)) < 5e-6  # rad/s, of 1.1e-3
 
 
-def test_real_iss_gaps_are_kept(station):
+def test_real_iss_gaps_are_kept():
+    station = iss()
     c = station.channel("control_torque_x")
     assert len(c.values) == 39271 and c.cadence_ns == 10**9
     assert sum(f.what == "gap" and f.channel == c.name and f.count == 45 for f in station.findings) == 1

@@ -6,8 +6,8 @@ import pytest
 from asflown.kit.errors import BadInput
 from asflown.kit.rotations import lvlh_to_inertial, quaternion, rotation
 from asflown.telemetry.load import load_telemetry
-from telemetry.flights import slew
-from telemetry.test_tables import written
+from flights import written
+from telemetry.signals import slew
 
 TIME = '[time]\ncolumn = "T"\nformat = "gps s"\n'
 WHEEL = '[[channel]]\ncolumn = "SPD"\nname = "wheel_rate_1"\nunit = "rpm"\n'

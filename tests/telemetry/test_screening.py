@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asflown.craft.load import load_craft
 from asflown.kit.errors import BadInput
 from asflown.telemetry.screening import dropouts, gaps, needs_a_look, noise_sigma, quantisation_step, screen, summaries
-from telemetry.flights import EPOCH, noise, telemetry_of
+from flights import CASSINI, EPOCH, telemetry_of
+from telemetry.signals import noise
 
 T = np.arange(0.0, 1000.0, 2.0)
 
@@ -182,7 +182,7 @@ def test_quaternion_sign_flips_are_harmless_and_bad_lengths_are_not():
 def test_rpm_labelled_rad_per_s_is_doubted():
     rpm = 600 + noise(500, 1)
     assert one(rpm, "wheel_rate_RWA1").doubts == ()  # 600 rad/s is possible for some wheel
-    t = screen(telemetry_of(wheel_rate_RWA1=(T, rpm), wheel_rate_RWA2=(T, -rpm)), load_craft("cassini"))
+    t = screen(telemetry_of(wheel_rate_RWA1=(T, rpm), wheel_rate_RWA2=(T, -rpm)), CASSINI)
     assert len(t.doubts) == 1 and needs_a_look(t)
     assert t.doubts[0].startswith("wheel_rate_RWA1, wheel_rate_RWA2: ") and "rpm labelled" in t.doubts[0]
     assert "unit?" in summaries(t)[0].suspicions

@@ -12,7 +12,8 @@ from asflown.kit.errors import BadInput
 from asflown.kit.timeline import NS, utc_to_tai_ns
 from asflown.telemetry.load import load_telemetry
 from asflown.telemetry.tables import write_table
-from telemetry.flights import EPOCH, noise, telemetry_of
+from flights import EPOCH, telemetry_of, written
+from telemetry.signals import noise
 
 GOOD = """# epoch: 2015-09-29T00:00:00 UTC
 time [s],sclk [],ert [utc],wheel_rate_RWA1 [rpm],body_rate_x [mrad/s],control_mode
@@ -21,12 +22,6 @@ time [s],sclk [],ert [utc],wheel_rate_RWA1 [rpm],body_rate_x [mrad/s],control_mo
 2.5,1/102.128,2015-09-29T01:00:02.5,601,0.27,
 4,1/104.000,2015-09-29T01:00:04,nan,0.28,RCS
 """
-
-
-def written(tmp_path, content, name="t.csv"):
-    path = tmp_path / name
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return path
 
 
 def test_table_says_names_units_blanks_and_clocks(tmp_path):

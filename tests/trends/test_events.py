@@ -4,9 +4,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from asflown import fly
 from asflown.kit.errors import BadInput
 from asflown.trends.entries.events import find_events, is_event_list, load_events, stall
+from flights import flown, written
 
 TOML = """
 [[event]]
@@ -32,9 +32,7 @@ b,stow,,,,2015-09-30,only its date
 
 def listed(tmp_path, text, name="events.toml"):
     (tmp_path / "a.csv").write_text("time [s]\n")
-    path = tmp_path / name
-    path.write_text(text)
-    return path
+    return written(tmp_path, text, name)
 
 
 def test_law_toml_and_csv_say_the_same(tmp_path):
@@ -77,29 +75,25 @@ def test_bad_csv_rows_name_their_line(tmp_path):
         load_events(listed(tmp_path, CSV + "c,stow\n", "events.csv"))
 
 
-@pytest.fixture(scope="module")
-def flights():
-    return {name: fly(name, noise="none").telemetry for name in ("cover-deploy", "cover-stow")}
-
-
 @pytest.mark.parametrize("name", ["cover-deploy", "cover-stow"])
-def test_recovery_actuations_are_found_from_current_and_angle(flights, name):
-    (found,) = find_events(flights[name])
+def test_recovery_actuations_are_found_from_current_and_angle(name):
+    (found,) = find_events(flown(name, noise="none").telemetry)
     assert found.kind == name.removeprefix("cover-")
     reach = found.motor_on_sigma_s * 12**0.5 / 2  # half the sampling interval: the truth lies between two samples
     assert abs(found.motor_on_s - 60) <= reach and reach == pytest.approx(32)
     assert abs(found.motor_off_s - 420) <= 32
 
 
-def test_recovery_stall_lies_between_two_samples(flights):
-    (found,) = find_events(flights["cover-deploy"])
-    when, sigma = stall(flights["cover-deploy"], found)
+def test_recovery_stall_lies_between_two_samples():
+    tlm = flown("cover-deploy", noise="none").telemetry
+    (found,) = find_events(tlm)
+    when, sigma = stall(tlm, found)
     assert abs(found.motor_on_s + when - 234) <= sigma
     assert sigma == pytest.approx(32)  # s, half of 64
 
 
-def test_a_motor_that_never_runs_is_said(flights):
-    quiet = flights["cover-deploy"].between(0, 55)
+def test_a_motor_that_never_runs_is_said():
+    quiet = flown("cover-deploy", noise="none").telemetry.between(0, 55)
     with pytest.raises(BadInput, match="no whole actuation"):
         find_events(quiet)
 

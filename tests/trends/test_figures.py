@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from asflown import fly, load_craft
+from asflown import fly
 from asflown.kit.errors import BadInput
 from asflown.trends.entries.actuation import analyse
 from asflown.trends.entries.events import Event
 from asflown.trends.entries.figures import FIGURES, Torque, figure_of_merit, load_figures, measure
+from flights import CASSINI
 
 TIME = np.arange(-60.0, 361.0)
 EVENT = Event("e", "deploy", "2015-09-29T00:00:00", None, 60.0, 420.0)
@@ -60,7 +61,7 @@ def test_law_a_start_known_badly_widens_the_impulse():
 @pytest.mark.parametrize("kind", ["deploy", "stow"])
 def test_recovery_figures_of_a_flown_actuation(kind):
     flight = fly(f"cover-{kind}", seed=11)
-    entry = analyse(Event("e", kind, None, None, 60.0, 420.0), load_craft("cassini"), flight.telemetry)
+    entry = analyse(Event("e", kind, None, None, 60.0, 420.0), CASSINI, flight.telemetry)
     truth = Torque(flight.truth.time_s - 60, flight.truth.torque_Nm[:, 1])
     for name in ("angular_impulse", "peak_positive", "peak_negative", "peak_momentum", "net_impulse"):
         v, true = entry.value(name, "fused"), measure(FIGURES[name], truth, "truth")[0].value
@@ -80,7 +81,7 @@ def test_recovery_figures_of_a_flown_actuation(kind):
 def test_an_event_outside_its_telemetry_is_refused():
     telemetry = fly("cover-deploy", noise="none").telemetry
     with pytest.raises(BadInput, match="the motor runs from 60 to 4200 s"):
-        analyse(Event("e", "deploy", None, None, 60.0, 4200.0), load_craft("cassini"), telemetry)
+        analyse(Event("e", "deploy", None, None, 60.0, 4200.0), CASSINI, telemetry)
 
 
 def test_a_users_figure_is_computed_beside_the_shipped(tmp_path):

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asflown.craft.load import load_craft
 from asflown.estimate.gates.fit import fit_gates
 from asflown.kit.errors import BadInput
 from asflown.kit.timeline import utc_to_tai_ns
@@ -15,8 +14,8 @@ from asflown.trends.entries.gates import gates_entry
 from asflown.trends.store.store import TrendStore
 from asflown.trends.verdicts import judge
 from cli.program import complaint, run
+from flights import CASSINI
 
-CASSINI = load_craft("cassini")
 RCS = past_model("rcs/2012-1").model
 YEARS = range(2005, 2013)
 DAY = 86_400_000_000_000

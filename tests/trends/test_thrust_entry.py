@@ -1,5 +1,7 @@
 """Thrust over the years: against the blow-down, each thruster against the others, and what would have been seen."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,11 +12,10 @@ from asflown.estimate.thrust.result import ThrustResult
 from asflown.kit.errors import BadInput
 from asflown.kit.timeline import utc_to_tai_ns
 from asflown.sim.flight.closed_loop import fly
-from asflown.telemetry.channels import kind_of
-from asflown.telemetry.telemetry import Channel, Telemetry
 from asflown.trends.entries.thrust import thrust_entry
 from asflown.trends.verdicts import judge
 from cli.program import run
+from flights import telemetry_of
 
 CASSINI = load_craft("cassini", cm=(0, 0, 1.35))
 NAMES = tuple(t.name for t in CASSINI.thrusters)
@@ -41,8 +42,7 @@ def records(seed: int, weak: float = 1.0, faster: float = 0.0):
             dict.fromkeys(NAMES, 0.02), mean, 0.02, {}, dict.fromkeys(NAMES, 1.0), dict.fromkeys(NAMES, 8.0), True, 0.065, 0.004,
             over_mean={n: (r, OWN) for n, r in zip(NAMES, ratios, strict=True)}, predicted_N=predicted,
         )  # fmt: skip
-        c = Channel("body_rate_x", np.array([ns]), np.zeros(1), np.ones(1, bool), kind_of("body_rate_x").unit)
-        entries.append(thrust_entry(result, Telemetry({"body_rate_x": c}, ns), CASSINI, None, {}))
+        entries.append(thrust_entry(result, telemetry_of(ns, body_rate_x=([0], [0])), CASSINI, None, {}))
     return entries
 
 
@@ -79,9 +79,8 @@ def test_other_methods_are_kept_apart_and_a_record_needs_a_date(tmp_path):
     printed = thrust(flight.telemetry, CASSINI, method="printed")
     bases = {v.basis for v in thrust_entry(printed, flight.telemetry, CASSINI, "mine", {}).values}
     assert bases == {"printed, corrected"}
-    undated = Telemetry(flight.telemetry.channels, flight.telemetry.epoch_ns, dated=False)
     with pytest.raises(BadInput, match="no place in a trend"):
-        thrust_entry(printed, undated, CASSINI, None, {})
+        thrust_entry(printed, replace(flight.telemetry, dated=False), CASSINI, None, {})
 
 
 def test_program_watches_thrust(tmp_path):

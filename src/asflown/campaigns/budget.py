@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..craft.model import Craft
 from ..estimate.fused import PEAK_REACH_S
 from ..estimate.torque import METHODS, VARIANTS, TorqueResult, disturbance_torque
 from ..kit.errors import BadInput, some_of
@@ -21,6 +20,11 @@ from ..sim.flight import fly
 from ..sim.scenario import Scenario, load_scenario
 from ..telemetry.channels import AXES
 from .truth import against_truth
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from ..craft.model import Craft
 
 #: A method by name: its own, corrected, or with "-printed".
 DEFAULT_METHODS = ("momentum-printed", "transfer-printed", "momentum", "transfer", "fused")

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from ..estimate.torque import Comparison, TorqueResult
-from ..telemetry.telemetry import Telemetry
+if TYPE_CHECKING:
+    from ..estimate.torque import Comparison, TorqueResult
+    from ..telemetry.telemetry import Telemetry
 
 #: 000 section V: motor on at minute 1; the "second dynamics" begin at minute 2.35. [s]
 MOTOR_ON_S, SECOND_PHASE_S = 60.0, 141.0

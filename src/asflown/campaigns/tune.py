@@ -7,19 +7,23 @@ what leaving I w out has put on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..craft.model import Craft
 from ..estimate.subject import Subject, splined, subject_of
 from ..estimate.torque import smoothed_as_printed, splined_momentum
 from ..kit.errors import BadInput
 from ..sim.flight import Flight, fly
-from ..sim.scenario import Scenario
 from ..telemetry.channels import AXES
 from .budget import of_rise
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from ..craft.model import Craft
+    from ..sim.scenario import Scenario
 
 #: Shares of the record that the search tries.
 SPANS = (0.02, 0.04, 0.06, 0.07, 0.08, 0.09, 0.10, 0.12)

@@ -17,18 +17,10 @@ def print_json(record: dict) -> None:
 
 def provenance(inputs: dict[str, str], options: dict, seed=None) -> dict:
     """Which files (name -> SHA-256), versions, options and seed made a result."""
-    import platform
-    from importlib.metadata import version
+    from ..kit.result import Input
+    from ..kit.result import provenance as told
 
-    return {
-        "inputs": [{"file": name, "sha256": digest} for name, digest in inputs.items()],
-        "versions": {
-            "python": platform.python_version(),
-            **{p: version(p) for p in ("asflown", "numpy", "scipy", "numba", "astropy")},
-        },
-        "options": options,
-        "seed": seed,
-    }
+    return told([Input(n, d) for n, d in inputs.items()], options, seed)
 
 
 def say(text: str = "") -> None:
@@ -50,10 +42,12 @@ def progress():
     return say if sys.stderr.isatty() else None
 
 
-def print_doubts(doubts) -> None:
-    """Doubts in words, under every text result."""
-    for d in doubts:
-        print(wrapped("  DOUBT  ", d))
+def print_doubts(doubts: Doubts) -> None:
+    """Doubts in words under every text result, the gravest first; suspect and void ones are marked."""
+    from ..kit.doubts import Doubts, doubt_mark
+
+    for d in Doubts(doubts).gravest_first:
+        print(wrapped(f"  {doubt_mark(d):<6} ", str(d)))
 
 
 def wrapped(head: str, text: str) -> str:

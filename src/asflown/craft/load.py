@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..kit.config import read_bytes, toml_table, validated
 from ..kit.errors import BadInput, some_of
+from ..kit.result import inputs_of
 from .model import Craft
 
 
@@ -39,6 +40,7 @@ def load_craft(name_or_file: str | Path, *, inertia=None, cm=None) -> Craft:
             )
         source = (_profiles() / f"{name}.toml").read_bytes()
     craft = validated(Craft, toml_table(source, name), name, "See docs/craft.md for the keys and their units.")
+    craft._inputs = inputs_of(path) if path.suffix == ".toml" or "/" in text else ()
     if alternative:
         craft = craft.with_alternative(alternative)
     if inertia is not None or cm is not None:

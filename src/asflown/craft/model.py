@@ -7,15 +7,17 @@ products of inertia), about the centre of mass.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, model_validator
 
+from ..kit.doubts import Doubt, Doubts, Kind, Severity
 from ..kit.errors import BadInput, some_of
 from ..kit.quantities import numbers, quantity
+from ..kit.result import Input
 from ..kit.timeline import utc_label, utc_to_tai_ns
 
 
@@ -89,6 +91,23 @@ def check_inertia(I_B: np.ndarray, what: str) -> None:
             remedy="Moments must be positive and no one larger than the sum of the other two. The order is "
             "Ixx, Iyy, Izz, Ixy, Ixz, Iyz in kg m2, tensor elements (not negated products of inertia).",
         )
+
+
+STATED = Kind("craft.stated", Severity.CAUTION, "{sentence}")  # a doubt that the craft's file itself states
+INTERPOLATED = Kind(
+    "craft.inertia-interpolated", Severity.CAUTION,
+    "the inertia on {date} is interpolated by date between {before} and {after}: the propellant used in between is not known",
+    "Give the inertia (--inertia), or the propellant ledger in the craft file.",
+)  # fmt: skip
+NEAREST = Kind(
+    "craft.inertia-nearest", Severity.CAUTION,
+    "the inertia is that of {date}, the nearest date known for this configuration",
+    "Give the inertia of the date: --inertia.",
+)  # fmt: skip
+
+
+def _day(tai_ns: int) -> str:
+    return utc_label(tai_ns)[:10]
 
 
 class _Data(BaseModel):
@@ -344,6 +363,13 @@ class Craft(_Data):
     center_of_mass_assumed: MetreVector | None = None  # a likely place, where none is known
     alternatives: dict[str, Alternative] = Field(default_factory=dict)
 
+    _inputs: tuple[Input, ...] = PrivateAttr(default=())
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """The file that describes it; empty for a built-in craft."""
+        return self._inputs
+
     @model_validator(mode="after")
     def _consistent(self):
         for things in (self.thrusters, self.mechanisms, self.flexible_modes, self.slosh):
@@ -443,13 +469,13 @@ class Craft(_Data):
 
     def at(self, tai_ns: int | None) -> CraftAt:
         """The craft on a date (None: the latest known state)."""
-        doubts: list[str] = []
+        doubts: list[Doubt] = []
         moment = tai_ns if tai_ns is not None else max((m.date for m in self.mass_properties), default=0)
         wheels = [w for w in self.wheels if w.serves_at(moment)] if tai_ns is not None else _latest(self.wheels)
         I_B, relative = self._inertia_at(moment, doubts)
-        return CraftAt(self, tai_ns, I_B, relative, tuple(wheels), tuple(doubts))
+        return CraftAt(self, tai_ns, I_B, relative, tuple(wheels), Doubts(doubts).passed_on_by("craft"))
 
-    def _inertia_at(self, moment: int, doubts: list[str]):
+    def _inertia_at(self, moment: int, doubts: list[Doubt]):
         known = sorted((m for m in self.mass_properties if m.basis != "predicted"), key=lambda m: m.date)
         if not known:
             return None, False
@@ -463,21 +489,16 @@ class Craft(_Data):
             x, how = self._fraction(a.date, b.date, moment)
             I_B = (1 - x) * tensor(a.elements) + x * tensor(b.elements)
             for m in (a, b):
-                if m.doubt and 0 < x < 1 and m.doubt not in doubts:
-                    doubts.append(m.doubt)
+                if m.doubt and 0 < x < 1:
+                    doubts.append(STATED(sentence=m.doubt))
             if how == "date":
-                doubts.append(
-                    f"the inertia on {utc_label(moment)[:10]} is interpolated by date between {utc_label(a.date)[:10]} and "
-                    f"{utc_label(b.date)[:10]}: the propellant used in between is not known"
-                )
+                doubts.append(INTERPOLATED(date=_day(moment), before=_day(a.date), after=_day(b.date)))
         else:
             I_B = tensor(a.elements)
             if a.doubt:
-                doubts.append(a.doubt)
+                doubts.append(STATED(sentence=a.doubt))
             if abs(moment - a.date) > 200 * 86_400 * 10**9:
-                doubts.append(
-                    f"the inertia is that of {utc_label(a.date)[:10]}, the nearest date known for this configuration"
-                )
+                doubts.append(NEAREST(date=_day(a.date)))
         return I_B, a.inertia is None
 
     def _fraction(self, start: int, stop: int, moment: int) -> tuple[float, str]:
@@ -512,7 +533,7 @@ class CraftAt:
     inertia_kgm2: np.ndarray | None  # (3, 3); per unit spin inertia where ``relative``
     relative: bool
     wheels: tuple[Wheel, ...]
-    doubts: tuple[str, ...] = field(default=())
+    doubts: Doubts = Doubts()
 
     def wheel(self, name: str) -> Wheel | None:
         return next((w for w in self.wheels if w.name == name), None)

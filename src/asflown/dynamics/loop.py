@@ -11,11 +11,13 @@ with e = commanded minus estimated attitude and T the torque on the body.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg, signal
 
-from ..craft.model import WheelController
+if TYPE_CHECKING:
+    from ..craft.model import WheelController
 
 
 def filter_section(controller: WheelController) -> np.ndarray:

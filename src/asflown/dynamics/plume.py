@@ -14,15 +14,18 @@ Each formula is there as printed too (``variant='printed'``).  What is wrong in 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..kit.errors import BadInput, some_of
 from ..kit.quantities import quantity
 from .flyby import Flyby, tables
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 VARIANTS, ANGLES = ("corrected", "printed"), ("plane", "space")
 #: Distances within which 004 applies eq 26. [m]

@@ -49,6 +49,14 @@ class BadInput(ValueError):
         return BadInput(self.what, remedy=self.remedy, file=file, channel=self.channel, time=self.time, line=self.line)
 
 
+def check_choice(value, allowed, what: str) -> None:
+    """Raise BadInput where ``value`` is none of those allowed; None among them is not named."""
+    if value not in allowed:
+        raise BadInput(
+            f"{what} {value!r} is not known", remedy=f"Choose one of: {some_of(a for a in allowed if a is not None)}."
+        )
+
+
 def some_of(names, most: int = 12) -> str:
     """A list of names for a message, never longer than a person reads."""
     names = [str(n) for n in names]

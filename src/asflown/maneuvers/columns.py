@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from datetime import UTC, datetime
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from ..kit.quantities import numbers, quantity, si_factor
 from ..kit.timeline import utc_to_tai_ns
 from ..telemetry.channels import split_header
 from ..telemetry.tables import SCALES, Table, numbers_of, read_csv, read_parquet, times_of, words_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 WORDS = ("id", "engine", "excluded", "adjusted", "note")
 #: Numbers of one maneuver -> SI unit.

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..kit.config import read_bytes
 from ..kit.errors import BadInput
 from .history import PastModel, engine_called
 from .model import Gates
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 def earlier_model(path: Path, engine: str) -> PastModel:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import csv
 import io
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..kit.files import write_text
 from ..kit.timeline import utc_label
-from .table import Maneuvers
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from .table import Maneuvers
 
 
 def write_maneuvers(m: Maneuvers, path: str | Path) -> None:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..estimate.subject import Subject, grid_for, splined
 from ..estimate.torque import TorqueResult, smoothed_as_printed, splined_momentum
 from ..telemetry.channels import AXES
-from ..telemetry.telemetry import Telemetry
 from .figure import BLUE, BY_AXIS, GREEN, GREY, ORANGE, RED, minutes, new_figure
 from .torque import draw_torque, draw_truth
+
+if TYPE_CHECKING:
+    from ..telemetry.telemetry import Telemetry
 
 _RPM = 60 / (2 * np.pi)
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from itertools import cycle
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..dynamics.plume import jet_density
-from ..estimate.density import DensityResult
-from ..estimate.jets import JetsResult
 from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, new_figure, save, write_doubts
+
+if TYPE_CHECKING:
+    from ..estimate.density import DensityResult
+    from ..estimate.jets import JetsResult
 
 _PLUME_S = (-60.0, 180.0)  # where jets are met
 _TALL = 4  # of the tallest peak: an axis of so many has nothing to do with gas

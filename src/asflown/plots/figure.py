@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import textwrap
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..kit.doubts import doubt_mark
 from ..kit.errors import BadInput
 from ..kit.files import write_whole
+
+if TYPE_CHECKING:
+    from ..kit.doubts import Doubts
 
 #: Colours that also differ in grey and for the colour-blind (Okabe and Ito).
 BLUE, ORANGE, GREEN, RED, PURPLE, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#777777"
@@ -33,10 +38,10 @@ def new_figure(rows: int = 1, columns: int = 1, *, width: float = 8.0, height: f
     return figure, axes
 
 
-def write_doubts(figure, doubts, *, first=(), columns: int = 125) -> None:
-    """Doubts beneath a figure, those in ``first`` before all others, and how many there was no room for."""
-    ordered = [d for d in first if d in doubts] + [d for d in doubts if d not in first]
-    lines = [textwrap.fill("DOUBT " + d, columns) for d in ordered[:_ROOM]]
+def write_doubts(figure, doubts: Doubts, *, columns: int = 125) -> None:
+    """Doubts beneath a figure, the gravest first, and how many there was no room for."""
+    ordered = doubts.gravest_first
+    lines = [textwrap.fill(f"{doubt_mark(d)} {d}", columns) for d in ordered[:_ROOM]]
     if len(ordered) > _ROOM:
         lines.append(f"and {len(ordered) - _ROOM} more doubt{'s' if len(ordered) > _ROOM + 1 else ''}, in the text")
     if lines:

@@ -6,20 +6,16 @@ components 11, model and reconstruction 12.  Time is from closest approach.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import cycle
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..craft.model import Craft
 from ..dynamics.plume import Jet, sources_passed
 from ..dynamics.trajectory import Trajectory
-from ..estimate.density import DensityResult
-from ..estimate.jets import JetsResult
 from ..estimate.subject import samples_of, subject_of
 from ..kit.errors import BadInput
 from ..telemetry.channels import AXES
-from ..telemetry.telemetry import Telemetry
 from .density import (
     OF_JETS,
     draw_bound,
@@ -32,6 +28,14 @@ from .density import (
     shown_s,
 )
 from .figure import BLUE, BY_AXIS, GREEN, GREY, ORANGE, RED, new_figure
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..craft.model import Craft
+    from ..estimate.density import DensityResult
+    from ..estimate.jets import JetsResult
+    from ..telemetry.telemetry import Telemetry
 
 #: Family of channels -> file name, label, what one SI unit is in it.
 _READINGS = {

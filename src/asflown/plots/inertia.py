@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from ..estimate.inertia import InertiaResult
 from ..telemetry.channels import AXES
 from .figure import BY_AXIS, GREY, breaks, new_figure, save, write_doubts
+
+if TYPE_CHECKING:
+    from ..estimate.inertia import InertiaResult
 
 
 def draw_rates(result: InertiaResult, ax):

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from ..estimate.leak import LeakResult
 from .figure import BLUE, BY_AXIS, GREY, RED, new_figure, save, write_doubts
 from .torque import time_scale
+
+if TYPE_CHECKING:
+    from ..estimate.leak import LeakResult
 
 _AXES = "XYZ"
 

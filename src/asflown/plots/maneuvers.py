@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from ..estimate.gates import Directions, GatesFit, Judgement, Watch
-from ..maneuvers.model import Gates
 from .figure import BLUE, GREEN, GREY, ORANGE, RED, new_figure
 from .labels import label_points
+
+if TYPE_CHECKING:
+    from ..estimate.gates import Directions, GatesFit, Judgement, Watch
+    from ..maneuvers.model import Gates
 
 #: Burns up to which all are labelled; of more, those that stand out.
 _ALL = 15

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from ..estimate.thrust import EventSeen, ThrustResult
 from .figure import BLUE, BY_AXIS, GREEN, GREY, ORANGE, PURPLE, RED, new_figure, save, write_doubts
 from .torque import time_scale
+
+if TYPE_CHECKING:
+    from ..estimate.thrust import EventSeen, ThrustResult
 
 _RPM = 60 / (2 * np.pi)
 _COLOURS = (BLUE, ORANGE, GREEN, RED, PURPLE, GREY)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from ..estimate.torque import TorqueResult
 from ..telemetry.channels import AXES
 from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, new_figure, save, write_doubts
+
+if TYPE_CHECKING:
+    from ..estimate.torque import TorqueResult
 
 _COLORS = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, "black")
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from datetime import datetime, timedelta
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..trends.entries import FIRST_PHASE_S
-from ..trends.entry import Entry
 from ..trends.statistics import FEWEST, TORQUE, YEAR, Pair, family_band
-from ..trends.verdicts import FigureHealth
 from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, new_figure
+
+if TYPE_CHECKING:
+    from ..trends.entry import Entry
+    from ..trends.verdicts import FigureHealth
 
 #: Greys of an overlay, oldest first; the newest is red.
 GREYS = ("#d2d2d2", "#c2c2c2", "#b2b2b2", "#a2a2a2", "#929292", "#828282", "#727272", "#626262", "#525252", "#424242")

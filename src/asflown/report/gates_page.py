@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..estimate.gates import FEWEST_BEFORE, GatesFit, Judgement, Patch, Watch, watch_maneuvers
 from ..kit.errors import BadInput
@@ -11,6 +11,9 @@ from ..kit.files import check_place, write_text
 from ..kit.plain import plain
 from ..plots.maneuvers import degradation_figure, gates_figures, watch_figure
 from .pictures import Picture, svg_of, template
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 #: Figure -> title and words.
 _WORDS = {

@@ -5,7 +5,7 @@ Reads a verdict, draws with plots, fills a template.  Pictures are SVG inside th
 from __future__ import annotations
 
 import json
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,8 +15,12 @@ from ..plots import trend as draw
 from ..trends.entries import BASES
 from ..trends.entry import MOVES
 from ..trends.record import health_record, sudden_words
-from ..trends.verdicts import FigureHealth, Health
 from .pictures import Picture, svg_of, template
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from ..trends.verdicts import FigureHealth, Health
 
 #: Figures whose years are drawn first, whatever is found (000 Figs 17, 18).
 _FIRST = ("angular_impulse", "peak_positive", "peak_negative")

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..maneuvers.model import Gates
 from ..maneuvers.table import Maneuvers
+
+if TYPE_CHECKING:
+    from ..maneuvers.model import Gates
 
 
 @dataclass(frozen=True)

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..kit.errors import BadInput
 from ..kit.timeline import utc_to_tai_ns
 from .channels import kind_of, split_header, to_si
+from .findings import Finding
 from .tables import Table, numbers_of, times_of, whole_second, words_of
-from .telemetry import Channel, Finding
+from .telemetry import Channel
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 
 @dataclass

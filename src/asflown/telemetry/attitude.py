@@ -8,6 +8,7 @@ moves nothing can be said, and that is said.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +16,11 @@ from ..kit.errors import BadInput
 from ..kit.rotations import rates_between
 from ..kit.timeline import NS
 from .channels import AXES
+from .findings import ERROR_TOO_FAST, RATE_SCALE
 from .telemetry import BRIDGED, Telemetry
+
+if TYPE_CHECKING:
+    from ..kit.doubts import Doubt
 
 SIGNIFICANT = 14.0  # log-likelihood: odds of a million to one
 BETTER = 1.5  # and by this ratio of squared misfit, which a small timing error does not reach
@@ -144,11 +149,8 @@ def _error_scale(telemetry: Telemetry) -> Telemetry:
     error = float(np.sqrt(np.sum((change - slope * w) ** 2) / (w.size * size)))
     if abs(slope) - 5 * error < TOO_FAST:
         return telemetry
-    return _doubted(
-        telemetry,
-        f"{', '.join(names)}: changes {abs(slope):.3g} times as fast as the body turns: "
-        f"are the values mrad or deg labelled {telemetry.channels[names[0]].unit_given or 'rad'}?",
-    )
+    unit = telemetry.channels[names[0]].unit_given or "rad"
+    return _doubted(telemetry, ERROR_TOO_FAST(channels=names, ratio=abs(slope), unit=unit))
 
 
 def rate_scale(telemetry: Telemetry) -> tuple[float, str] | None:
@@ -181,13 +183,13 @@ def _scales(telemetry: Telemetry, rate: np.ndarray, w: np.ndarray) -> Telemetry:
     found = _scale(rate, w)
     if found is None or not found[1]:
         return telemetry
-    names = ", ".join(f"body_rate_{a}" for a in AXES)
-    return _doubted(telemetry, f"{names}: {found[0]:.4g} times the rates of the quaternion: {found[1]}")
+    names = [f"body_rate_{a}" for a in AXES]
+    return _doubted(telemetry, RATE_SCALE(channels=names, ratio=found[0], guess=found[1]))
 
 
 def _rms(x: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.sum(x**2, axis=1))))
 
 
-def _doubted(telemetry: Telemetry, doubt: str) -> Telemetry:
-    return replace(telemetry, doubts=(*telemetry.doubts, doubt))
+def _doubted(telemetry: Telemetry, doubt: Doubt) -> Telemetry:
+    return replace(telemetry, doubts=telemetry.doubts + [doubt])

@@ -33,8 +33,9 @@ from ..kit.rotations import lvlh_to_inertial, quaternion, rotation
 from ..kit.timeline import NS
 from .assemble import Read, Use, assembled
 from .channels import AXES, kind_of, split_header, to_si
+from .findings import Finding
 from .tables import Table, divided, numbers_of
-from .telemetry import Channel, Finding
+from .telemetry import Channel
 
 
 class _Part(BaseModel):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from ..kit.errors import BadInput, some_of
 from ..kit.files import sha256_of
 from ..kit.timeline import NS, et_to_tai_ns
 from .trajectory import TrajectoryTable
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 #: How far on either side of closest approach, and how often. [s]
 REACH_S, STEP_S = 660.0, 5.0

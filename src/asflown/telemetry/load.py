@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from ..kit.errors import BadInput, some_of
 from ..kit.files import sha256_of
+from ..kit.result import Input, inputs_of
 from .assemble import _TIME_UNITS, Read, Use, assembled, time_scale
 from .channels import kind_of, split_header, to_si
 from .tables import Table, divided, long_columns, read_csv, read_netcdf, read_parquet
@@ -46,6 +48,7 @@ def load_telemetry(path, *, channels=None, exclude=None, craft=None) -> Telemetr
             dated=read.dated,
             source=str(path),
             sha256=sha256_of(data),
+            inputs=(Input(str(path), sha256_of(data)), *inputs_of(channels)),
             time_labels=read.time_labels,
             label_tai_ns=read.label_tai_ns,
             findings=tuple(read.findings),
@@ -57,7 +60,7 @@ def load_telemetry(path, *, channels=None, exclude=None, craft=None) -> Telemetr
         return telemetry
     spans = read_exclusions(exclude, telemetry)
     try:
-        return telemetry.excluding(spans)
+        return replace(telemetry.excluding(spans), inputs=(*telemetry.inputs, *inputs_of(exclude)))
     except BadInput as why:
         raise why.within(exclude) from None
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -16,7 +17,11 @@ from scipy.special import pdtrc
 from ..kit.errors import BadInput
 from ..kit.timeline import NS, segments
 from .channels import kind_of
-from .telemetry import BRIDGED, Channel, Finding, Telemetry
+from .findings import ERROR_TOO_FAST, IMPLAUSIBLE, RATE_SCALE, Finding
+from .telemetry import BRIDGED, Channel, Telemetry
+
+if TYPE_CHECKING:
+    from ..kit.doubts import Doubt
 
 SPIKE_SIGMAS = 20.0  # far beyond any noise; kicks of a sticking wheel reach 10 on their own channel
 AGREE = 0.2  # a spike's neighbours differ among themselves by less than this part of its height
@@ -29,6 +34,9 @@ _MEASURED = frozenset({
     "wheel_rate", "body_rate", "attitude_error", "rate_error", "controller_rate_error", "quaternion",
     "wheel_momentum", "wheel_momentum_magnitude", "orbit_position", "orbit_velocity",
 })  # fmt: skip
+
+#: Doubts that a unit is not the one written.
+_OF_UNITS = (IMPLAUSIBLE, ERROR_TOO_FAST, RATE_SCALE)
 
 #: Findings after which a person should look before the data are used (exit code 3 of `telemetry check`).
 SERIOUS = frozenset({"conflict", "spike", "stuck", "norm", "fall"})
@@ -59,7 +67,7 @@ def screen(telemetry: Telemetry, craft=None) -> Telemetry:
         label_tai_ns=rows[0],
         time_labels={k: v[rows[1]] for k, v in telemetry.time_labels.items()},
         findings=(*telemetry.findings, *findings),
-        doubts=(*telemetry.doubts, *_implausible(channels, craft)),
+        doubts=telemetry.doubts + _implausible(channels, craft),
     )
 
 
@@ -396,15 +404,15 @@ def _whole_quaternions(channels: dict[str, Channel]) -> tuple[dict[str, Channel]
     return channels, [Finding("quaternion_w", "norm", int(off.sum()), int(instants[off][0]), "quaternions not of length one, not used")]  # fmt: skip
 
 
-def _implausible(channels: dict[str, Channel], craft) -> list[str]:
+def _implausible(channels: dict[str, Channel], craft) -> list[Doubt]:
     """Magnitudes no spacecraft has: most often a unit written in the heading that is not the column's."""
     limits = {} if craft is None else {w.name: w.rate_limit for w in craft.wheels if w.rate_limit}
     beyond: dict[tuple[str, float, str], list[tuple[str, float]]] = {}
     for c in channels.values():
-        kind, whose = c.kind, ""
+        kind, whose = c.kind, "the plausible limit"
         limit = kind.plausible
         if kind.stem == "wheel_rate" and c.member in limits:
-            limit, whose = 1.05 * limits[c.member], f"{craft.name}'s wheel limit "
+            limit, whose = 1.05 * limits[c.member], f"{craft.name}'s wheel rate limit"
         if limit is None or not c.valid.any():
             continue
         size = np.abs(c.usable.values)
@@ -414,12 +422,16 @@ def _implausible(channels: dict[str, Channel], craft) -> list[str]:
     for (stem, limit, whose), those in beyond.items():
         kind = next(kind_of(n) for n, _ in those)
         given = channels[those[0][0]].unit_given
-        names = ", ".join(n for n, _ in those)
         guess = f": are the values {kind.mistaken_for} labelled {given}?" if kind.mistaken_for else ""
         doubts.append(
-            f"{names}: up to {max(v for _, v in those):.4g} {kind.unit or stem}, beyond "
-            f"{whose or 'what is plausible, '}{limit:.4g} {kind.unit}".rstrip()
-            + guess
+            IMPLAUSIBLE(
+                channels=[n for n, _ in those],
+                largest=max(v for _, v in those),
+                unit=kind.unit or stem,
+                limit=limit,
+                limit_of=whose,
+                guess=guess,
+            )
         )
     return doubts
 
@@ -451,7 +463,7 @@ def summaries(telemetry: Telemetry) -> list[ChannelSummary]:
     for c in telemetry.channels.values():
         at, state = telemetry.seconds(c.tai_ns), c.kind.behaves == "state"
         odd = [f"{f.what} {f.count}" for f in telemetry.findings if f.channel == c.name and f.what not in ("gap", "dropout", "wrap")]  # fmt: skip
-        odd += ["unit?" for d in telemetry.doubts if c.name in d.partition(":")[0].split(", ")]
+        odd += ["unit?" for d in telemetry.doubts.of(*_OF_UNITS) if c.name in d.about["channels"].split(", ")]
         lines.append(
             ChannelSummary(
                 name=c.name,
@@ -473,5 +485,4 @@ def summaries(telemetry: Telemetry) -> list[ChannelSummary]:
 
 def needs_a_look(telemetry: Telemetry) -> bool:
     """Whether a person should look before the data are used: something serious was found, or a unit is doubted."""
-    odd_unit = any(d.partition(":")[0].split(", ")[0] in telemetry for d in telemetry.doubts)
-    return odd_unit or any(f.what in SERIOUS for f in telemetry.findings)
+    return telemetry.doubts.has(*_OF_UNITS) or any(f.what in SERIOUS for f in telemetry.findings)

@@ -11,11 +11,10 @@ import gzip
 import re
 import zlib
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,6 +24,9 @@ from ..kit.quantities import si_factor
 from ..kit.timeline import NS, et_to_tai_ns, gps_to_tai_ns, utc_label, utc_to_tai_ns
 from .channels import split_header
 from .telemetry import LONGEST_S, Telemetry
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 #: Time scales a column may be written in.
 SCALES = ("s", "utc", "gps s", "et s", "unix s")

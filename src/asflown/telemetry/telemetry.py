@@ -8,28 +8,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..kit.doubts import Doubts
 from ..kit.errors import BadInput, some_of
 from ..kit.timeline import NS, cadence_ns, seconds_since, segments, utc_label, utc_to_tai_ns
 from .channels import AXES, ChannelKind, kind_of, member_of
+from .findings import Finding, found_in
+
+if TYPE_CHECKING:
+    from ..kit.result import Input
 
 #: Runs of at most this many missing samples are bridged; longer ones are gaps.
 BRIDGED = 5
 
 LONGEST_S = 4_000_000_000  # seconds from any epoch that int64 nanoseconds hold with room to spare
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Something noticed in a channel ('' for the whole file), with how often and where first."""
-
-    channel: str
-    what: str  # duplicate, conflict, disorder, repeat, spike, stuck, still, wrap, fall, norm, nan, gap, dropout, orbit, ignored, excluded
-    count: int
-    first_tai_ns: int
-    detail: str
 
 
 @dataclass(frozen=True)
@@ -91,7 +86,9 @@ class Telemetry:
     label_tai_ns: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))  # the instants they belong to
     findings: tuple[Finding, ...] = ()
     exclusions: tuple[Exclusion, ...] = ()
-    doubts: tuple[str, ...] = ()
+    doubts: Doubts = Doubts()
+    inputs: tuple[Input, ...] = ()  # the file itself, its channel dictionary, its exclusions
+    used: set[str] | None = field(default=None, compare=False, repr=False)  # channels asked for, of a watched copy
 
     def __contains__(self, name: str) -> bool:
         return name in self.channels
@@ -104,7 +101,17 @@ class Telemetry:
                 channel=name,
                 remedy=f"The telemetry holds: {some_of(self.channels)}.",
             )
+        if self.used is not None:
+            self.used.add(name)
         return self.channels[name]
+
+    def watched(self) -> Telemetry:
+        """The same telemetry, which notes in ``used`` the channels that are asked for."""
+        return replace(self, used=set())
+
+    def found_in(self, channels) -> Doubts:
+        """What the door found in some channels, as doubts."""
+        return found_in(self.findings, channels)
 
     def members(self, stem: str) -> list[str]:
         """Which wheels, thrusters or mechanisms have a ``stem`` channel."""

@@ -6,7 +6,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from asflown.craft.load import load_craft
 from asflown.dynamics.environment import gravity_gradient
 from asflown.dynamics.flyby import flyby_called
 from asflown.dynamics.plume import as_passed, plume_density, published_jets
@@ -15,10 +14,9 @@ from asflown.estimate.fused.whitening import hats, regression
 from asflown.estimate.jets.fit import jets
 from asflown.kit.errors import BadInput
 from asflown.sim.flight.closed_loop import fly
-from asflown.telemetry.tables import write_table
 from cli.program import complaint, run
+from flights import CASSINI, past_e3, saved, without
 
-CASSINI = load_craft("cassini")
 E3 = flyby_called("E3")
 EPOCH, CLOSEST, CLOSEST_S = "2008-03-12T19:03:12", "2008-03-12T19:06:12", 180.0
 SCALE = 0.5 * 2.1 * 14410**2 * 18.401 * 0.853  # N m per kg/m3
@@ -26,14 +24,8 @@ FLIGHT, UP = (0, 1, 0), (1, 0, 0)
 
 
 @cache
-def flown(seed=3, exponent=2, **more):
-    plume = {"shape": "plume", "closest_approach": f"{CLOSEST_S} s", "exponent": exponent}
-    return fly("quiet", craft=CASSINI, epoch=EPOCH, duration="480 s", seed=seed, torques=[plume], **more)
-
-
-@cache
 def fused():
-    return density(flown().telemetry, CASSINI, "E3", CLOSEST)
+    return density(past_e3().telemetry, CASSINI, "E3", CLOSEST)
 
 
 def true_density(f, r):
@@ -45,7 +37,7 @@ def true_density(f, r):
 
 def test_published_errors_add_up():
     """004 section VI: 5.9 % of what is known of the drag, 5 % of the torque, 7.73 % together."""
-    r = density(flown().telemetry, CASSINI, "E3", CLOSEST, variant="printed")
+    r = density(past_e3().telemetry, CASSINI, "E3", CLOSEST, variant="printed")
     assert r.scale == 0.059 and r.peak.sigma_kgm3 / r.peak.density_kgm3 == pytest.approx(0.0773, abs=5e-5)
     assert r.torque_per_density == (-3.422e9,) and (r.method, r.variant) == ("transfer", "printed")
     assert r.gravity_gradient_Nm is None and r.peak.sigma_time_s is None
@@ -54,7 +46,7 @@ def test_published_errors_add_up():
 @pytest.mark.parametrize(("order", "low"), [(6, 0.27), (12, 0.07)])
 def test_published_polynomials_are_low(order, low):
     """004 eqs 6 to 8 and 17, 18 over -20 to +130 s, noise-free: a peak of -0.0162 and -0.0206 for -0.0222 N m (recomputed)."""
-    f = flown(exponent=1, noise="none")
+    f = past_e3(exponent=1, noise="none")
     arc = f.telemetry.between(CLOSEST_S - 20, CLOSEST_S + 130)
     r = density(arc, CASSINI, "E3", CLOSEST, method="polynomial", order=order, variant="printed")
     assert 1 + r.peak.density_kgm3 * SCALE / f.truth.peaks[0][1] == pytest.approx(low, abs=0.015)
@@ -64,10 +56,10 @@ def test_published_polynomials_are_low(order, low):
 
 
 def test_law_density_is_torque_over_drag_and_both_errors_stay_apart():
-    r = density(flown().telemetry, CASSINI, "E3", CLOSEST, method="momentum")
+    r = density(past_e3().telemetry, CASSINI, "E3", CLOSEST, method="momentum")
     assert r.torque_per_density == pytest.approx((-SCALE,))
     assert r.density_kgm3 == pytest.approx(-r.torque_Nm / SCALE)
-    doubled = density(flown().telemetry, CASSINI, "E3", CLOSEST_S, method="momentum", area_m2=2 * 18.401)
+    doubled = density(past_e3().telemetry, CASSINI, "E3", CLOSEST_S, method="momentum", area_m2=2 * 18.401)
     assert doubled.peak.density_kgm3 == pytest.approx(r.peak.density_kgm3 / 2)
     assert doubled.scale == r.scale == pytest.approx(0.059)
     assert r.sigma_kgm3 == pytest.approx(np.hypot(r.sigma_shape_kgm3, 0.059 * r.density_kgm3))
@@ -75,7 +67,7 @@ def test_law_density_is_torque_over_drag_and_both_errors_stay_apart():
 
 
 def test_law_gravity_gradient_is_taken_off_where_the_attitude_is_told():
-    f = flown()
+    f = past_e3()
     bounded = density(f.telemetry, CASSINI, "E3", CLOSEST, method="momentum")
     told = density(f.telemetry, CASSINI, "E3", CLOSEST, method="momentum", velocity_B=FLIGHT, up_B=UP)
     I_B = CASSINI.at(f.telemetry.epoch_ns).inertia_kgm2
@@ -91,7 +83,7 @@ def test_law_gravity_gradient_is_taken_off_where_the_attitude_is_told():
 
 def test_law_the_arms_sign_is_that_of_the_largest_excursion():
     plume = {"shape": "plume", "closest_approach": f"{CLOSEST_S} s", "sign": 1}
-    f = fly("quiet", craft=CASSINI, epoch=EPOCH, duration="480 s", seed=3, torques=[plume])
+    f = fly("quiet", epoch=EPOCH, duration="480 s", seed=3, torques=[plume])
     r = density(f.telemetry, CASSINI, "E3", CLOSEST, method="momentum")
     assert r.torque_per_density[0] > 0 and r.peak.density_kgm3 > 5e-12
 
@@ -99,12 +91,12 @@ def test_law_the_arms_sign_is_that_of_the_largest_excursion():
 def test_law_a_drag_table_of_constant_values_is_the_crafts_own_drag(tmp_path):
     table = tmp_path / "drag.csv"
     table.write_text("# E3\ntime [s],area [m2],arm_z [m]\n-300,18.401,-0.853\n300,18.401,-0.853\n")
-    a = density(flown().telemetry, CASSINI, "E3", CLOSEST, method="momentum")
-    b = density(flown().telemetry, CASSINI, "E3", CLOSEST, method="momentum", drag_table=table)
+    a = density(past_e3().telemetry, CASSINI, "E3", CLOSEST, method="momentum")
+    b = density(past_e3().telemetry, CASSINI, "E3", CLOSEST, method="momentum", drag_table=table)
     assert b.density_kgm3 == pytest.approx(a.density_kgm3) and b.sign == 1 and b.axis == "z"
     faster = table.read_text().replace("area [m2]", "speed [km/s],area [m2]").replace(",18.401", ",28.82,18.401")
     table.write_text(faster)
-    c = density(flown().telemetry, CASSINI, "E3", CLOSEST, method="momentum", drag_table=table)
+    c = density(past_e3().telemetry, CASSINI, "E3", CLOSEST, method="momentum", drag_table=table)
     assert c.density_kgm3 == pytest.approx(a.density_kgm3 / 4)
 
 
@@ -141,9 +133,7 @@ def oblique(tmp_path, share_y=0.6):
         "time [s],y [N m],z [N m]\n" + "".join(f"{a},{share_y * b},{b}\n" for a, b in zip(t, T, strict=True))
     )
     table.write_text("time [s],area [m2],arm_y [m],arm_z [m]\n-600,18.401,-0.5118,-0.853\n600,18.401,-0.5118,-0.853\n")
-    return fly(
-        "quiet", craft=CASSINI, epoch=EPOCH, duration="480 s", seed=3, torques=[{"shape": "table", "file": str(torque)}]
-    ), table
+    return fly("quiet", epoch=EPOCH, duration="480 s", seed=3, torques=[{"shape": "table", "file": str(torque)}]), table
 
 
 def test_law_several_axes_tell_one_density_better_and_whether_they_agree(tmp_path):
@@ -192,7 +182,7 @@ def test_a_drag_table_that_is_not_one(text, words, tmp_path):
     if text is not None:
         table.write_text(text)
     with pytest.raises(BadInput, match=words) as e:
-        density(flown().telemetry, CASSINI, "E3", CLOSEST, method="momentum", drag_table=table)
+        density(past_e3().telemetry, CASSINI, "E3", CLOSEST, method="momentum", drag_table=table)
     assert "drag.csv" in str(e.value)
 
 
@@ -203,7 +193,7 @@ def peaks_off(seeds, exponent):
     """Relative errors of the peak, pulls of shape and time, and lateness [s]."""
     found = []
     for seed in seeds:
-        f = flown(seed, exponent)
+        f = past_e3(seed, exponent)
         at_s, torque, _ = f.truth.peaks[0]
         p = density(f.telemetry, CASSINI, "E3", CLOSEST).peak
         off, late = p.density_kgm3 + torque / SCALE, p.time_s + CLOSEST_S - at_s
@@ -245,7 +235,7 @@ def test_recovery_of_the_peak_where_the_sources_are_not_those_published(power, t
     )
     late, pulls = [], []
     for seed in range(6):
-        f = fly("quiet", craft=CASSINI, epoch=EPOCH, duration="480 s", seed=seed, torques=[{"shape": "table", "file": str(tmp_path / "t.csv")}])  # fmt: skip
+        f = fly("quiet", epoch=EPOCH, duration="480 s", seed=seed, torques=[{"shape": "table", "file": str(tmp_path / "t.csv")}])  # fmt: skip
         p = density(f.telemetry, CASSINI, "E3", CLOSEST).peak
         late.append(p.time_s + CLOSEST_S - t[np.argmax(rho)])
         pulls.append((p.density_kgm3 - rho.max()) / p.sigma_shape_kgm3)
@@ -254,7 +244,7 @@ def test_recovery_of_the_peak_where_the_sources_are_not_those_published(power, t
 
 
 def test_recovery_along_the_flyby():
-    f, r = flown(), fused()
+    f, r = past_e3(), fused()
     off = r.density_kgm3 - true_density(f, r)
     assert np.sqrt(np.mean(off**2)) < 0.02 * r.peak.density_kgm3
     assert np.std(off / r.sigma_shape_kgm3) < 2.0
@@ -263,19 +253,18 @@ def test_recovery_along_the_flyby():
 
 
 def test_no_gas_is_said_to_be_none():
-    f = fly("quiet", craft=CASSINI, epoch=EPOCH, duration="480 s", seed=1)
+    f = fly("quiet", epoch=EPOCH, duration="480 s", seed=1)
     r = density(f.telemetry, CASSINI, "E3", CLOSEST, method="momentum")
     assert r.noticed is None and any("no gas is seen" in d for d in r.doubts)
 
 
 def test_no_gas_is_not_said_of_a_craft_on_thrusters_whose_firing_is_not_told(tmp_path):
-    tlm = fly("e5", craft=CASSINI, seed=1).telemetry
-    silent = replace(tlm, channels={n: c for n, c in tlm.channels.items() if not n.startswith(("on_time", "pulse"))})
+    tlm = fly("e5", seed=1).telemetry
+    silent = without(tlm, "on_time", "pulse_count")
     for verb in (density, jets):
         with pytest.raises(BadInput, match="thrusters hold the craft"):
             verb(silent, CASSINI, "E5", 300.0)
-    unsaid = replace(silent, channels={n: c for n, c in silent.channels.items() if n != "control_mode"})
-    doubts = density(unsaid, CASSINI, "E5", 300.0).doubts
+    doubts = density(without(silent, "control_mode"), CASSINI, "E5", 300.0).doubts
     assert any("says nothing of whether there was gas" in d for d in doubts)
     assert not any("no gas is seen" in d for d in doubts)
 
@@ -283,7 +272,7 @@ def test_no_gas_is_not_said_of_a_craft_on_thrusters_whose_firing_is_not_told(tmp
 @pytest.mark.parametrize(("start", "stop"), [(CLOSEST_S + 60, 480), (0, CLOSEST_S + 20)])
 def test_a_peak_outside_the_record_is_not_found_in_it(start, stop):
     """The plume's peak is 33 s after closest approach."""
-    r = density(flown().telemetry.between(start, stop), CASSINI, "E3", CLOSEST_S)
+    r = density(past_e3().telemetry.between(start, stop), CASSINI, "E3", CLOSEST_S)
     assert start - CLOSEST_S <= r.peak.time_s <= stop - CLOSEST_S
     assert any("may lie outside it" in d for d in r.doubts)
     assert any("closest approach is not in the record" in d for d in r.doubts) == (start > CLOSEST_S)
@@ -293,7 +282,7 @@ def test_a_peak_outside_the_record_is_not_found_in_it(start, stop):
 def test_an_arm_of_the_wrong_sign_is_not_no_gas(tmp_path):
     table = tmp_path / "drag.csv"
     table.write_text("time [s],area [m2],arm_z [m]\n-300,18.401,0.853\n300,18.401,0.853\n")
-    r = density(flown().telemetry, CASSINI, "E3", CLOSEST, drag_table=table, cusps=False)
+    r = density(past_e3().telemetry, CASSINI, "E3", CLOSEST, drag_table=table, cusps=False)
     assert any("has the arm the sign" in d for d in r.doubts) and not any("no gas" in d for d in r.doubts)
 
 
@@ -302,14 +291,13 @@ def test_no_peak_where_the_arm_passes_through_zero(tmp_path):
     """Before -20 s, where there is no gas, the torque says nothing: noise over a vanishing arm is not the peak."""
     table = tmp_path / "drag.csv"
     table.write_text("time [s],area [m2],arm_z [m]\n-300,18.401,0\n-20,18.401,0\n-5,18.401,-0.853\n300,18.401,-0.853\n")
-    r = density(flown().telemetry, CASSINI, "E3", CLOSEST, drag_table=table)
+    r = density(past_e3().telemetry, CASSINI, "E3", CLOSEST, drag_table=table)
     assert r.peak.time_s == pytest.approx(33.1, abs=1.5) and r.peak.density_kgm3 == pytest.approx(6.95e-12, rel=0.05)
     assert np.isnan(r.density_kgm3[r.time_s < -21]).all()
 
 
 def test_without_body_rates_the_body_counts_as_attitude_errors_tell_it():
-    tlm = flown().telemetry
-    bare = replace(tlm, channels={n: c for n, c in tlm.channels.items() if not n.startswith("body_rate")})
+    bare = without(past_e3().telemetry, "body_rate")
     r = density(bare, CASSINI, "E3", CLOSEST)
     assert r.method == "transfer" and r.peak.density_kgm3 == pytest.approx(6.95e-12, rel=0.1)
     wheels = density(bare, CASSINI, "E3", CLOSEST, method="momentum")
@@ -319,12 +307,12 @@ def test_without_body_rates_the_body_counts_as_attitude_errors_tell_it():
 
 
 def test_scale_is_unknown_away_from_the_flyby_of_the_craft_file_and_no_sigma_is_zero():
-    r = density(flown().telemetry, CASSINI, "E4", CLOSEST)
+    r = density(past_e3().telemetry, CASSINI, "E4", CLOSEST)
     record = r.record()
     assert record["sigma_scale_fraction"] is None and record["peak"]["sigma_kgm3"] is None
     assert "scale unknown" in str(r) and all(b.sigma_ratio is None for b in r.beside)
     assert r.peak.sigma_time_s > 0.02 and r.peak.sigma_altitude_m > 0
-    own = density(flown().telemetry, CASSINI, "E4", CLOSEST, method="momentum", area_m2=20.0, arm_m=0.7)
+    own = density(past_e3().telemetry, CASSINI, "E4", CLOSEST, method="momentum", area_m2=20.0, arm_m=0.7)
     assert own.scale is not None
 
 
@@ -336,7 +324,7 @@ def test_scale_is_unknown_away_from_the_flyby_of_the_craft_file_and_no_sigma_is_
 def test_a_drag_table_that_is_short_coarse_or_of_another_speed_is_doubted(rows, words, tmp_path):
     table = tmp_path / "drag.csv"
     table.write_text("time [s],speed [km/s],area [m2],arm_z [m]\n" + rows)
-    r = density(flown().telemetry, CASSINI, "E3", CLOSEST, method="momentum", drag_table=table)
+    r = density(past_e3().telemetry, CASSINI, "E3", CLOSEST, method="momentum", drag_table=table)
     assert any(words in d for d in r.doubts)
 
 
@@ -357,19 +345,17 @@ def test_peaks_published_for_the_same_flyby_stand_beside():
 
 def test_where_the_geometry_is_not_known_the_peak_is_that_of_the_curve():
     with_it = fused()
-    without = density(flown().telemetry, CASSINI, "E5", CLOSEST, area_m2=18.4, arm_m=0.85)
-    assert (with_it.peak.way, without.peak.way) == ("of jets and a remainder", "of the curve")
-    assert (
-        without.peak.density_kgm3 == without.density_kgm3.max()
-        and without.peak.sigma_time_s > with_it.peak.sigma_time_s
-    )
-    assert any("smoothed curve" in d for d in without.doubts) and not any("smoothed curve" in d for d in with_it.doubts)
+    bare = density(past_e3().telemetry, CASSINI, "E5", CLOSEST, area_m2=18.4, arm_m=0.85)
+    assert (with_it.peak.way, bare.peak.way) == ("of jets and a remainder", "of the curve")
+    assert bare.peak.density_kgm3 == bare.density_kgm3.max()
+    assert bare.peak.sigma_time_s > with_it.peak.sigma_time_s
+    assert any("smoothed curve" in d for d in bare.doubts) and not any("smoothed curve" in d for d in with_it.doubts)
     found = with_it.settings["peak"]
     assert found["jets_probability"] > 0.9 and found["power_probability"]["2"] > found["power_probability"]["1"]
 
 
 def test_doubts():
-    tlm = flown().telemetry
+    tlm = past_e3().telemetry
     other = density(tlm, CASSINI, "E4", CLOSEST, method="momentum")
     assert any("2008-08-11" in d for d in other.doubts) and any("not at E4" in d for d in other.doubts)
     own = density(tlm, CASSINI, "E4", CLOSEST, method="momentum", area_m2=20.0, arm_m=0.7)
@@ -395,23 +381,22 @@ def test_doubts():
 def test_what_it_refuses(how, words):
     given = {"flyby": "E3", "closest_approach": CLOSEST, "method": "momentum"} | how
     with pytest.raises(BadInput, match=words):
-        density(flown().telemetry, CASSINI, **given)
+        density(past_e3().telemetry, CASSINI, **given)
 
 
 def test_it_refuses_a_craft_whose_drag_or_inertia_is_not_known():
     with pytest.raises(BadInput, match="drag of"):
-        density(flown().telemetry, CASSINI.model_copy(update={"aerodynamics": None}), "E3", CLOSEST)
+        density(past_e3().telemetry, CASSINI.model_copy(update={"aerodynamics": None}), "E3", CLOSEST)
     unknown = CASSINI.model_copy(update={"mass_properties": ()})
     with pytest.raises(BadInput, match="inertia"):
-        density(flown().telemetry, unknown, "E3", CLOSEST, method="momentum")
+        density(past_e3().telemetry, unknown, "E3", CLOSEST, method="momentum")
 
 
 # ---- the verb -----------------------------------------------------------------------------------------------
 
 
 def test_the_verb(tmp_path):
-    path = tmp_path / "e3.csv"
-    write_table(flown().telemetry, path)
+    path = saved(past_e3().telemetry, tmp_path)
     words = ("density", path, "--flyby", "E3", "--closest-approach", CLOSEST, "--method", "momentum")
     done = run(*words, "--json", "--plot", tmp_path / "d.svg")
     assert done.code == 0 and done.err == f"wrote {tmp_path / 'd.svg'}\n"
@@ -446,5 +431,5 @@ def test_the_verb(tmp_path):
 ])  # fmt: skip
 def test_the_verb_refuses(words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    write_table(flown().telemetry, tmp_path / "t.csv")
+    saved(past_e3().telemetry, tmp_path)
     complaint("density", "t.csv", "--flyby", "E3", "--closest-approach", CLOSEST, *words)

@@ -5,25 +5,22 @@ from functools import cache
 import numpy as np
 import pytest
 
-from asflown.craft.load import load_craft
+import flights
 from asflown.dynamics.flyby import flyby_called, published_peaks
 from asflown.estimate.density.along_flyby import density
 from asflown.estimate.firing.impulse import gained
 from asflown.estimate.jets.fit import jets
 from asflown.estimate.torque.on_times import areas, torque_on_times
 from asflown.kit.errors import BadInput
-from asflown.sim.flight.closed_loop import fly
-from asflown.telemetry.tables import write_table
 from cli.program import complaint, run
+from flights import CASSINI, saved, without
 
-CASSINI = load_craft("cassini")
 HELD = {"velocity_B": (0, 1, 0), "up_B": (1, 0, 0)}
 E5_S, TITAN_S = 300.0, 420.0
 
 
-@cache
 def flown(scenario="e5", seed=2, thrust="0.96 N", noise="nominal", **flyby):
-    return fly(scenario, seed=seed, noise=noise, thrusters={"thrust": thrust}, flyby=flyby)
+    return flights.flown(scenario, seed=seed, noise=noise, thrusters={"thrust": thrust}, flyby=flyby)
 
 
 @cache
@@ -116,7 +113,7 @@ def test_recovery_of_an_atmosphere():
 def test_recovery_of_a_thin_atmosphere_on_wheels():
     """The same balance where nothing fires: momentum is all."""
     passage = {"name": "Titan", "closest_approach": "240 s", "density": "2e-11 kg/m3"}
-    f = fly("quiet", epoch="2008-02-22T17:00:00", flyby=passage, seed=4)
+    f = flights.flown("quiet", epoch="2008-02-22T17:00:00", flyby=passage, seed=4)
     a = density(f.telemetry, CASSINI, "Titan", 240.0, method="momentum").atmosphere
     low, high = a.scale_height_95
     assert low < 58e3 < high and high - low < 12e3
@@ -130,7 +127,7 @@ def test_recovery_of_e5_over_many_flybys(exponent):
     off, pulls, late, thrust = [], [], [], []
     for seed in range(100, 140):
         believed = 1.0101 * (1 + 0.05 * np.random.default_rng(seed).standard_normal())
-        f = fly("e5", seed=seed, thrusters={"thrust": f"{believed:.4f} N"}, flyby={"exponent": exponent})
+        f = flights.flown("e5", seed=seed, thrusters={"thrust": f"{believed:.4f} N"}, flyby={"exponent": exponent})
         r = density(f.telemetry, CASSINI, "E5", E5_S, **HELD)
         at, rho, _, _ = f.met.peak
         off.append(r.peak.density_kgm3 / rho - 1)
@@ -155,8 +152,8 @@ def test_it_is_chosen_where_thrusters_fire_and_only_there():
 
 @pytest.mark.parametrize(("telemetry", "words"), [
     (lambda t: t.between(300, 360), "too few"),
-    (lambda t: fly("quiet", duration="120 s").telemetry, "no thruster fires"),
-    (lambda t: fly("slews", seed=1, duration="600 s", thrusters={"center_of_mass": "0 0 1.35 m"}).telemetry, "turns by"),
+    (lambda t: flights.flown("quiet", duration="120 s").telemetry, "no thruster fires"),
+    (lambda t: flights.flown("slews", seed=1, duration="600 s", thrusters={"center_of_mass": "0 0 1.35 m"}).telemetry, "turns by"),
 ])  # fmt: skip
 def test_what_it_refuses(telemetry, words):
     with pytest.raises(BadInput, match=words):
@@ -164,19 +161,11 @@ def test_what_it_refuses(telemetry, words):
 
 
 def test_the_verb(tmp_path):
-    path = tmp_path / "e5.csv"
-    write_table(flown().telemetry, path)
+    path = saved(flown().telemetry, tmp_path)
     words = ("density", path, "--flyby", "E5", "--closest-approach", "2008-10-09T19:06:40")
     done = run(*words, "--json")
     assert done.code == 0 and done.record["method"] == "on-times" and done.record["peak"]["sigma_time_s"] > 0
     assert {"start_s", "stop_s", "impulse_Nms", "sigma_Nms"} == set(done.record["settings"]["torque"]["impulses"][0])
     assert done.record["atmosphere"] is None
-    assert "body_rate_x" in complaint(*words[:1], without_rates(tmp_path), *words[2:])
-
-
-def without_rates(folder):
-    tlm = flown().telemetry
-    lean = {n: c for n, c in tlm.channels.items() if not n.startswith("body_rate")}
-    path = folder / "lean.csv"
-    write_table(type(tlm)(**{**vars(tlm), "channels": lean}), path)
-    return path
+    lean = saved(without(flown().telemetry, "body_rate"), tmp_path, "lean.csv")
+    assert "body_rate_x" in complaint(*words[:1], lean, *words[2:])

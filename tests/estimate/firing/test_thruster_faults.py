@@ -12,8 +12,8 @@ from asflown.estimate.thrust.methods import thrust
 from asflown.kit.errors import BadInput
 from asflown.sim.flight.closed_loop import fly
 from asflown.telemetry.load import load_telemetry
-from asflown.telemetry.tables import write_table
 from asflown.telemetry.telemetry import Telemetry
+from flights import changed, flown, renamed, saved, with_values, without
 
 EVENT, AMID, SEED = "wheel-bias-handover", 390.0, 3
 CASSINI = load_craft("cassini", cm=(0.127, 0.021, 1.35))
@@ -21,44 +21,30 @@ RPM = np.pi / 30
 FULL = [{"start": "330 s", "stop": "450 s", "rates": {"RWA1": "-2300 rpm", "RWA2": "-870 rpm", "RWA4": "-296 rpm"}}]
 
 
-def without(tlm: Telemetry, *stems: str) -> Telemetry:
-    return replace(tlm, channels={n: c for n, c in tlm.channels.items() if c.kind.stem not in stems})
-
-
 def clipped(tlm: Telemetry, wheel: str, rate: float) -> Telemetry:
-    c = tlm.channel(f"wheel_rate_{wheel}")
-    return replace(tlm, channels=tlm.channels | {c.name: replace(c, values=np.clip(c.values, -rate, rate))})
-
-
-def renamed(tlm: Telemetry, names: dict[str, str]) -> Telemetry:
-    """Thrusters' counters under other names."""
-    channels = {}
-    for c in tlm.channels.values():
-        name = f"{c.kind.stem}_{names.get(c.member, c.member)}" if c.kind.stem in ("on_time", "pulse_count") else c.name
-        channels[name] = replace(c, name=name)
-    return replace(tlm, channels=channels)
+    return changed(tlm, f"wheel_rate_{wheel}", lambda c: replace(c, values=np.clip(c.values, -rate, rate)))
 
 
 def said(result, *words: str) -> bool:
     return any(all(w in d for w in words) for d in result.doubts)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def sound():
-    return fly(EVENT, seed=SEED).telemetry
+    return flown(EVENT, seed=SEED).telemetry
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def uncounted():
     """Branch B fires and the file has the on-times of branch A."""
-    return fly(EVENT, seed=SEED, thrusters={"branch": "B", "counted_branch": "A"}).telemetry
+    return flown(EVENT, seed=SEED, thrusters={"branch": "B", "counted_branch": "A"}).telemetry
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def swapped():
     """The same from amid the biasing on."""
     swaps = [{"start": f"{AMID} s", "branch": "B"}]
-    return fly(EVENT, seed=SEED, thrusters={"counted_branch": "A"}, branch_swaps=swaps).telemetry
+    return flown(EVENT, seed=SEED, thrusters={"counted_branch": "A"}, branch_swaps=swaps).telemetry
 
 
 @pytest.fixture(scope="module")
@@ -106,16 +92,17 @@ def test_branch_too_short_for_its_noise_is_told_by_leak(uncounted):
 
 def test_branch_under_the_others_names_shows_in_the_thrust():
     """Places are the same: only a thrust unlike the one predicted tells, and the channel."""
-    flown = fly(EVENT, seed=SEED, thrusters={"branch": "B", "thrust": "0.59 N"}).telemetry
-    assert said(thrust(flown, CASSINI), "branch B is in use", "the thrust is that of branch B")
-    unlabelled = thrust(without(flown, "thruster_branch"), CASSINI)
+    other = fly(EVENT, seed=SEED, thrusters={"branch": "B", "thrust": "0.59 N"}).telemetry
+    assert said(thrust(other, CASSINI), "branch B is in use", "the thrust is that of branch B")
+    unlabelled = thrust(without(other, "thruster_branch"), CASSINI)
     assert said(unlabelled, "% from the", "predicted", "other branch")
-    assert not leak(without(flown, "thruster_branch"), CASSINI, thrust_N=0.699).alarm  # 16 % within 10 % of one sigma
+    assert not leak(without(other, "thruster_branch"), CASSINI, thrust_N=0.699).alarm  # 16 % within 10 % of one sigma
 
 
 def test_names_exchanged_two_and_two_are_refused(sound):
+    exchanged = renamed(sound, {"Y1": "Y2", "Y2": "Y1", "Y3": "Y4", "Y4": "Y3"}, "on_time", "pulse_count")
     with pytest.raises(BadInput, match=r"contradict each other.*exchanging Y1 with Y2 and Y3 with Y4"):
-        thrust(renamed(sound, {"Y1": "Y2", "Y2": "Y1", "Y3": "Y4", "Y4": "Y3"}), CASSINI)
+        thrust(exchanged, CASSINI)
 
 
 def test_the_alternative_is_always_named():
@@ -158,9 +145,9 @@ def test_reading_that_stops_at_the_limit_does_not_count(full):
     assert thrust(tlm, CASSINI, method="printed", priors=forty).mean_thrust_N == pytest.approx(0.699, rel=0.04)
     assert not leak(tlm, CASSINI, thrust_N=0.699).alarm
     stuck = tlm.channel("wheel_rate_RWA1")
-    always = replace(stuck, values=np.full_like(stuck.values, -2020 * RPM))
+    always = with_values(tlm, stuck.name, np.full_like(stuck.values, -2020 * RPM))
     with pytest.raises(BadInput, match="RWA1 is at its rate limit"):
-        thrust(replace(tlm, channels=tlm.channels | {always.name: always}), CASSINI)
+        thrust(always, CASSINI)
 
 
 def test_reading_that_stops_below_the_limit_is_suspected(sound):
@@ -176,16 +163,10 @@ def test_reading_that_stops_below_the_limit_is_suspected(sound):
 
 def test_declared_wraps_are_taken_up(sound, tmp_path):
     """On-times in counts of 1/8 s that wrap at 64, pulses at 32: with the wraps declared nothing changes, without them it is told."""
-    counted = {}
-    for n, c in sound.channels.items():
-        if c.kind.stem == "on_time":
-            c = replace(c, values=np.mod(np.round(c.values / 0.125), 64))
-        elif c.kind.stem == "pulse_count":
-            c = replace(c, values=np.mod(c.values, 32))
-        counted[n] = c
-    assert np.diff(counted["on_time_Y1"].values).min() < 0 and np.diff(counted["pulse_count_Y1"].values).min() < 0
-    file, words = tmp_path / "t.csv", tmp_path / "c.toml"
-    write_table(replace(sound, channels=counted), file)
+    counted = changed(sound, "on_time", lambda c: replace(c, values=np.mod(np.round(c.values / 0.125), 64)))
+    counted = changed(counted, "pulse_count", lambda c: replace(c, values=np.mod(c.values, 32)))
+    assert all(np.diff(counted.channel(n).values).min() < 0 for n in ("on_time_Y1", "pulse_count_Y1"))
+    file, words = saved(counted, tmp_path), tmp_path / "c.toml"
     head = next(line for line in file.read_text().splitlines() if line.startswith("time"))
     entries = []
     for column in head.split(",")[1:]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asflown import disturbance_torque, fly, load_craft, load_telemetry
+from asflown import disturbance_torque, load_craft, load_telemetry
 from asflown.campaigns.truth import against_truth
 from asflown.estimate.fused.body import response
 from asflown.estimate.fused.corners import draw_torques
@@ -21,8 +21,8 @@ from asflown.kit.errors import BadInput
 from asflown.kit.smoother import smooth
 from conftest import flight_data
 from estimate.linear_loop import respond
+from flights import CASSINI, changed, flown, only, scaled, without
 
-CASSINI = load_craft("cassini")
 BODY = HeldBody.under(CASSINI.wheel_controller, 5226.0)
 LEVELS = LoopLevels(0.01, 15, 2e-6, 1e-3, 5e-6, 8e-6, 15, 3e-4)
 
@@ -183,7 +183,7 @@ def test_recovery_fused_beats_both_printed_methods_and_its_band_holds(profile):
     """Nominal noise, four seeds: RMS at most a quarter of printed momentum, 1/2.4 of printed transfer; 95 % band."""
     ours, momentum, transfer, held, lags = [], [], [], [], []
     for seed in range(4):
-        flight = fly(profile, seed=seed)
+        flight = flown(profile, seed=seed)
         truth = (flight.truth.time_s, flight.truth.torque_Nm[:, 1])
         peaks = [(t, v) for t, v, _ in flight.truth.peaks]
         r = fused(flight.telemetry)
@@ -220,7 +220,7 @@ def test_recovery_impulse_has_a_sigma_that_holds():
     """000's first figure of merit, minute 1 to 2.35, without differentiating."""
     pulls = []
     for seed in range(6):
-        flight = fly("profile-1", seed=seed)
+        flight = flown("profile-1", seed=seed)
         value, sigma = fused(flight.telemetry).impulse(60, 141, "y")
         t = np.arange(60, 141.0001, 0.125)
         true = np.trapezoid(np.interp(t, flight.truth.time_s, flight.truth.torque_Nm[:, 1]), t)
@@ -230,7 +230,7 @@ def test_recovery_impulse_has_a_sigma_that_holds():
 
 
 def test_a_gap_is_bridged_with_a_wider_band():
-    flight = fly("profile-1", seed=2)
+    flight = flown("profile-1", seed=2)
     tlm = flight.telemetry
     keep = {n: c.where((tlm.seconds(c.tai_ns) < 200) | (tlm.seconds(c.tai_ns) > 230)) for n, c in tlm.channels.items()}
     r = fused(replace(tlm, channels=keep))
@@ -243,7 +243,7 @@ def test_a_gap_is_bridged_with_a_wider_band():
 
 def test_spikes_are_left_out_and_counted():
     """One in a hundred samples of every channel, also the first one, moved by thirty usual steps."""
-    flight = fly("profile-1", seed=3)
+    flight = flown("profile-1", seed=3)
     tlm, rng = flight.telemetry, np.random.default_rng(0)
     channels = {}
     for n, c in tlm.channels.items():
@@ -260,7 +260,7 @@ def test_spikes_are_left_out_and_counted():
 
 
 def test_same_input_gives_the_same_answer():
-    tlm = fly("profile-2", seed=1).telemetry
+    tlm = flown("profile-2", seed=1).telemetry
     a, b = fused(tlm), fused(tlm)  # the paths' seed is fixed and stands in the settings
     assert np.array_equal(a.torque_Nm[:, 1], b.torque_Nm[:, 1])
 
@@ -272,7 +272,7 @@ def test_the_spread_of_normal_samples_is_their_sigma():
 
 def test_recovery_gyroscopic_torque_is_taken_off():
     """The craft turns about z with momentum in its wheels: w x h is 1 mN m about x and y and none of it a disturbance."""
-    flight = fly("quiet", seed=1, wheel_rates={"RWA1": "900 rpm", "RWA2": "-900 rpm"}, torques=[
+    flight = flown("quiet", seed=1, wheel_rates={"RWA1": "900 rpm", "RWA2": "-900 rpm"}, torques=[
         {"shape": "constant", "torque": "0 0.004 0 N m"}])  # fmt: skip
     r = fused(flight.telemetry, axis="all")
     inner = (r.time_s > 60) & (r.time_s < 420)
@@ -283,10 +283,8 @@ def test_recovery_gyroscopic_torque_is_taken_off():
 
 def test_recovery_with_the_controller_unknown():
     """Wheels and rates alone: what the wheels do is measured.  The band holds; the attitude error's part is missed."""
-    flight = fly("profile-1", seed=2)
-    tlm = flight.telemetry
-    channels = {n: c for n, c in tlm.channels.items() if not n.startswith("attitude_error")}
-    r = fused(replace(tlm, channels=channels))
+    flight = flown("profile-1", seed=2)
+    r = fused(without(flight.telemetry, "attitude_error"))
     assert r.settings["loop"] == "measured" and any("taken as measured" in d for d in r.doubts)
     inside, rms = coverage(r, flight.truth)
     assert inside > 0.9 and rms < 9e-4  # printed momentum: 1.4e-3
@@ -294,7 +292,7 @@ def test_recovery_with_the_controller_unknown():
 
 def test_recovery_from_control_torque_alone():
     """Commands and rates, as where gyroscopes hold a station."""
-    flight = fly("profile-1", seed=2, telemetry={"control_torque": "1 s", "wheel_rate": "0 s"})
+    flight = flown("profile-1", seed=2, telemetry={"control_torque": "1 s", "wheel_rate": "0 s"})
     r = fused(flight.telemetry)
     assert r.settings["loop"] == "measured" and "control_torque" in r.settings["considered"]["y"]
     inside, rms = coverage(r, flight.truth)
@@ -302,13 +300,9 @@ def test_recovery_from_control_torque_alone():
 
 
 def test_recovery_a_clock_that_is_late_is_found_and_set():
-    flight = fly("profile-2", seed=4)
-    tlm = flight.telemetry
-    late = {
-        n: replace(c, tai_ns=c.tai_ns + 1_500_000_000) if n.startswith("attitude_error") else c
-        for n, c in tlm.channels.items()
-    }
-    r = fused(replace(tlm, channels=late))
+    flight = flown("profile-2", seed=4)
+    late = changed(flight.telemetry, "attitude_error", lambda c: replace(c, tai_ns=c.tai_ns + 1_500_000_000))
+    r = fused(late)
     offset = r.settings["time_offsets"]["y"]["attitude_error"]
     assert offset["corrected"] and offset["seconds"] == pytest.approx(1.5, abs=0.4)
     assert any("its times are shifted" in d for d in r.doubts)
@@ -317,7 +311,7 @@ def test_recovery_a_clock_that_is_late_is_found_and_set():
 
 def test_recovery_a_wrong_inertia_is_noticed():
     """10 % off: the data say so, and the answer does not follow it."""
-    flight = fly("profile-1", seed=1, noise="half")
+    flight = flown("profile-1", seed=1, noise="half")
     wrong = load_craft("cassini", inertia=(6510, 0.9 * 5333, 3519, -125, -39, 133))
     r = fused(flight.telemetry, wrong)
     assert any("want inertia" in d or "not used" in d for d in r.doubts)
@@ -326,32 +320,27 @@ def test_recovery_a_wrong_inertia_is_noticed():
 
 def test_a_loop_that_does_not_explain_the_data_is_not_used():
     """Attitude error of another craft: nothing in the loop as described could make it."""
-    flight, other = fly("profile-1", seed=1), fly("profile-2", seed=5)
-    mixed = {
-        n: other.telemetry.channel(n) if n.startswith("attitude_error") else c
-        for n, c in flight.telemetry.channels.items()
-    }
-    r = fused(replace(flight.telemetry, channels=mixed))
+    flight, other = flown("profile-1", seed=1), flown("profile-2", seed=5)
+    mixed = changed(flight.telemetry, "attitude_error", lambda c: other.telemetry.channel(c.name))
+    r = fused(mixed)
     assert r.settings["loop"] == "measured" and any("is not used" in d for d in r.doubts)
     assert coverage(r, flight.truth)[1] < 9e-4
-    with_it = fused(replace(flight.telemetry, channels=mixed), loop="modelled")
+    with_it = fused(mixed, loop="modelled")
     assert any("does not explain" in d for d in with_it.doubts)
 
 
 def test_wheels_read_at_instants_of_their_own():
     """The model carries each wheel's samples to common instants."""
-    flight = fly("profile-2", seed=1, telemetry={"wheel_rate": "1 s"})
-    tlm = flight.telemetry
-    phases = {"wheel_rate_RWA1": 0, "wheel_rate_RWA2": 1, "wheel_rate_RWA4": 3}
-    channels = {n: c.where(slice(phases[n], None, 4)) if n in phases else c for n, c in tlm.channels.items()}
-    r = fused(replace(tlm, channels=channels))
+    flight = flown("profile-2", seed=1, telemetry={"wheel_rate": "1 s"})
+    phases = {"RWA1": 0, "RWA2": 1, "RWA4": 3}
+    r = fused(changed(flight.telemetry, "wheel_rate", lambda c: c.where(slice(phases[c.member], None, 4))))
     assert any("carries their rates" in d for d in r.doubts)
     inside, rms = coverage(r, flight.truth)
     assert inside > 0.9 and rms < 5e-4
 
 
 def test_priors_and_considered_quantities_can_be_chosen():
-    flight = fly("profile-1", seed=1)
+    flight = flown("profile-1", seed=1)
     sigma = {}
     for prior in ("edges", "matern", "wiener"):
         r = fused(flight.telemetry, prior=prior)
@@ -370,7 +359,7 @@ def test_priors_and_considered_quantities_can_be_chosen():
 
 
 def test_a_long_record_is_smoothed_and_says_so():
-    flight = fly("quiet", seed=1, duration="7000 s", telemetry={"attitude_error": "4 s"})
+    flight = flown("quiet", seed=1, duration="7000 s", telemetry={"attitude_error": "4 s"})
     r = fused(flight.telemetry)
     assert r.settings["prior"] == "matern" and any("too long to look for corners" in d for d in r.doubts)
     assert np.sqrt(np.mean(r.torque_Nm[:, 1] ** 2)) < 1e-4
@@ -382,7 +371,7 @@ def test_a_long_record_is_smoothed_and_says_so():
 def test_a_peak_has_a_sigma_that_holds():
     pulls = []
     for seed in range(4):
-        flight = fly("profile-2", seed=seed)
+        flight = flown("profile-2", seed=seed)
         r = fused(flight.telemetry)
         for t, v, _ in flight.truth.peaks:
             p = r.peak(t, 8.0, "y")
@@ -393,12 +382,11 @@ def test_a_peak_has_a_sigma_that_holds():
 
 
 def test_the_default_falls_back_to_momentum_where_fused_cannot_be_used():
-    tlm = fly("profile-1", seed=1).telemetry
-    wheels = replace(tlm, channels={n: c for n, c in tlm.channels.items() if n.startswith("wheel_rate")})
+    tlm = flown("profile-1", seed=1).telemetry
+    wheels = only(tlm, "wheel_rate")
     r = disturbance_torque(wheels, CASSINI, axis="y")
     assert r.method == "momentum" and "the fused method cannot be used (body_rate_y" in r.doubts[0]
-    errors = replace(tlm, channels={n: c for n, c in tlm.channels.items() if n.startswith("attitude_error")})
-    r = disturbance_torque(errors, CASSINI, axis="y")
+    r = disturbance_torque(only(tlm, "attitude_error"), CASSINI, axis="y")
     assert r.method == "transfer" and "this is the transfer method" in r.doubts[0]
     with pytest.raises(BadInput, match="body_rate"):
         fused(wheels)
@@ -408,7 +396,7 @@ def test_the_default_falls_back_to_momentum_where_fused_cannot_be_used():
 
 @pytest.mark.slow
 def test_recovery_in_a_slew_the_actuators_are_taken_as_measured():
-    flight = fly("slews", seed=1)
+    flight = flown("slews", seed=1)
     r = fused(flight.telemetry, axis="all")
     assert r.settings["loop"] == "measured" and any("slews" in d for d in r.doubts)
     assert np.sqrt(np.mean(r.torque_Nm**2)) < 3e-3  # N m; the wheels pass hundreds of times that
@@ -417,10 +405,9 @@ def test_recovery_in_a_slew_the_actuators_are_taken_as_measured():
 
 
 def test_a_silent_channel_a_short_record_and_the_printed_variant_are_refused():
-    tlm = fly("profile-1", seed=1).telemetry
-    c = tlm.channel("attitude_error_y")
+    tlm = flown("profile-1", seed=1).telemetry
     with pytest.raises(BadInput, match="never changes"):
-        fused(replace(tlm, channels=tlm.channels | {c.name: replace(c, values=0 * c.values)}))
+        fused(scaled(tlm, "attitude_error_y", 0))
     with pytest.raises(BadInput, match="fewer than 25"):
         fused(tlm.between(0, 60))
     with pytest.raises(BadInput, match="in no paper"):

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from asflown import disturbance_torque, fly, load_craft
+from asflown import disturbance_torque, fly
 from asflown.estimate.fused.peaks import PEAK_REACH_S, excursions, peak_scale
 from asflown.sim.scenario.scenario import load_scenario
+from flights import CASSINI, flown
 
 
 def flights(off: float, said: float, seed: int):
@@ -39,7 +40,7 @@ def test_law_what_stands_out_less_than_a_quarter_is_no_excursion():
 
 
 def test_recovery_sigma_and_interval_of_a_peak_are_those_of_its_draws_times_the_scale():
-    r = disturbance_torque(fly("cover-deploy", seed=3).telemetry, load_craft("cassini"), axis="y", method="fused")
+    r = disturbance_torque(flown("cover-deploy", seed=3).telemetry, CASSINI, axis="y", method="fused")
     scale = r.settings["torque"]["y"]["peak_scale"]
     assert 1 <= scale < 3 and scale == r.peak_scale("y") and r.peak_scale("x") == 1.0
     at_s, true = LARGE[0]
@@ -53,7 +54,7 @@ def test_recovery_sigma_and_interval_of_a_peak_are_those_of_its_draws_times_the_
 
 
 def test_law_pure_lines_are_not_flown_again():
-    r = disturbance_torque(fly("profile-2", seed=3).telemetry, load_craft("cassini"), axis="y", method="fused")
+    r = disturbance_torque(flown("profile-2", seed=3).telemetry, CASSINI, axis="y", method="fused")
     assert r.settings["torque"]["y"]["lines_probability"] > 0.5 and "peak_scale" not in r.settings["torque"]["y"]
     assert r.peak_scale("y") == 1.0
 
@@ -65,7 +66,7 @@ def test_recovery_intervals_of_a_curves_narrow_peaks_hold(noise):
     plan, held = load_scenario("cover-deploy"), []
     for seed in range(1000, 1008):
         flight = fly(plan, seed=seed, noise=noise)
-        r = disturbance_torque(flight.telemetry, load_craft("cassini"), axis="y", method="fused")
+        r = disturbance_torque(flight.telemetry, CASSINI, axis="y", method="fused")
         held += [r.peak(at_s, PEAK_REACH_S, "y").holds(true) for at_s, true in LARGE]
     assert np.mean(held) > 0.85
 

@@ -15,35 +15,22 @@ from asflown.estimate.inertia.slews import find_slews
 from asflown.estimate.inertia.tensor import METHODS, inertia_tensor
 from asflown.kit.errors import BadInput
 from asflown.kit.rotations import quaternion
-from asflown.sim.flight.closed_loop import fly
-from asflown.telemetry.channels import AXES, kind_of
+from asflown.kit.timeline import NS
+from asflown.telemetry.channels import AXES
 from asflown.telemetry.load import load_telemetry
-from asflown.telemetry.tables import write_table
-from asflown.telemetry.telemetry import Channel, Telemetry
 from asflown.trends.entries.inertia import inertia_entry
 from cli.program import complaint, run
-from conftest import ROOT, flight_data
-
-CASSINI = load_craft("cassini")
-NS = 1_000_000_000
+from conftest import flight_data
+from flights import CASSINI, changed, flown, inspiresat1, iss, saved, telemetry_of, with_channels, with_values, without
 
 
-@cache
-def flight(seed=1, noise="nominal", **_):
-    return fly("slews", seed=seed, noise=noise)
+def flight(seed=1, noise="nominal"):
+    return flown("slews", seed=seed, noise=noise)
 
 
 @cache
 def fitted(seed=1, method="consistent"):
     return inertia_tensor(flight(seed).telemetry, CASSINI, method=method)
-
-
-def changed(tlm: Telemetry, stem: str, change) -> Telemetry:
-    return replace(tlm, channels={n: change(c) if c.kind.stem == stem else c for n, c in tlm.channels.items()})
-
-
-def without(tlm: Telemetry, stem: str) -> Telemetry:
-    return replace(tlm, channels={n: c for n, c in tlm.channels.items() if c.kind.stem != stem})
 
 
 def pulls(result, truth) -> np.ndarray:
@@ -108,9 +95,8 @@ def test_law_momentum_balance_with_gravity_is_exact_where_the_torque_is():
     columns = {f"quaternion_{m}": q[:, k] for k, m in enumerate("wxyz")}
     for k, a in enumerate(AXES):
         columns |= {f"body_rate_{a}": w[:, k], f"control_torque_{a}": u[:, k], f"orbit_position_{a}": r_N[:, k]}
-    ns = 592_000_000 * NS + np.rint(t * NS).astype(np.int64)
-    made = {k: Channel(k, ns, v, np.ones(len(ns), bool), kind_of(k).unit) for k, v in columns.items()}
-    result = inertia_tensor(Telemetry(made, int(ns[0])), load_craft("iss"))
+    made = telemetry_of(592_000_000 * NS, **{k: (t, v) for k, v in columns.items()})
+    result = inertia_tensor(made, load_craft("iss"))
     assert result.method == "momentum balance" and not result.excitation.untold
     assert result.inertia == pytest.approx(I_B, rel=2e-3, abs=1e5)
     assert result.torque == pytest.approx(constant, abs=0.02)
@@ -131,15 +117,13 @@ def test_recovery_of_tensor_and_torque():
 
 @pytest.mark.slow
 def test_recovery_pulls_are_unit_normal():
-    found = np.array(
-        [pulls(inertia_tensor(fly("slews", seed=s).telemetry, CASSINI), flight().inertia_kgm2) for s in range(40)]
-    )
+    found = np.array([pulls(inertia_tensor(flight(s).telemetry, CASSINI), flight().inertia_kgm2) for s in range(40)])
     assert np.all(np.abs(found.mean(axis=0)) < 0.5) and found.std() == pytest.approx(1.0, abs=0.15)
 
 
 def test_recovery_of_an_external_torque_in_body_axes():
     torque = {"shape": "constant", "torque": "-0.53e-6 -2.11e-6 1.83e-6 N m"}
-    result = inertia_tensor(fly("slews", seed=7, torques=[torque]).telemetry, CASSINI)
+    result = inertia_tensor(flown("slews", seed=7, torques=[torque]).telemetry, CASSINI)
     assert np.all(np.abs(result.torque - [-0.53e-6, -2.11e-6, 1.83e-6]) < 4 * result.torque_sigma)
     assert result.torque[1] / result.torque_sigma[1] < -4
 
@@ -171,8 +155,7 @@ def test_trap_quaternion_the_other_way_round_is_named(tmp_path):
     turned = changed(flight().telemetry, "quaternion", lambda c: c if c.member == "w" else replace(c, values=-c.values))
     with pytest.raises(BadInput, match="conjugate"):
         inertia_tensor(turned, CASSINI)
-    write_table(turned, tmp_path / "turned.csv")
-    assert "conjugate" in complaint("inertia", tmp_path / "turned.csv")
+    assert "conjugate" in complaint("inertia", saved(turned, tmp_path))
 
 
 def test_trap_rates_in_degrees_are_named_with_and_without_attitude():
@@ -193,13 +176,12 @@ def test_trap_time_stamps_apart_are_found_said_and_mended(stem, words):
 
 def test_trap_a_thruster_inside_a_slew_is_left_out_and_said():
     kick = {"shape": "table", "axis": "x", "times": "800 800.5 801.5 802 s", "torques": "0 0.5 0.5 0 N m"}
-    kicked = fly("slews", seed=5, torques=[kick])
+    kicked = flown("slews", seed=5, torques=[kick])
     untold = inertia_tensor(kicked.telemetry, CASSINI)
     assert any("momentum steps near 80" in d for d in untold.doubts)
     t = np.arange(0, 2401, 8.0)
-    ns = kicked.telemetry.epoch_ns + np.rint(t * NS).astype(np.int64)
-    on = Channel("on_time_Y1", ns, np.where(t > 800, 1.5, 0.0), np.ones(len(t), bool), "s")
-    told = inertia_tensor(replace(kicked.telemetry, channels=kicked.telemetry.channels | {"on_time_Y1": on}), CASSINI)
+    fired = telemetry_of(kicked.telemetry.epoch_ns, on_time_Y1=(t, np.where(t > 800, 1.5, 0.0)))
+    told = inertia_tensor(with_channels(kicked.telemetry, *fired.channels.values()), CASSINI)
     assert any("thrusters fire at 799-812 s" in d for d in told.doubts) and told.settings["arcs"] == 2
     for result in (untold, told):
         assert np.abs(pulls(result, kicked.inertia_kgm2)).max() < 4.5
@@ -208,7 +190,7 @@ def test_trap_a_thruster_inside_a_slew_is_left_out_and_said():
 def test_trap_a_whiff_of_a_thruster_that_no_channel_tells_of_is_found():
     """0.02 N m s of 15 that move: 2 % of conservation do not see it, and left in it moves Ixx by ten sigmas."""
     kick = {"shape": "table", "axis": "x", "times": "800 800.5 801.5 802 s", "torques": "0 0.02 0.02 0 N m"}
-    kicked = fly("slews", seed=5, torques=[kick])
+    kicked = flown("slews", seed=5, torques=[kick])
     result = inertia_tensor(kicked.telemetry, CASSINI)
     (said,) = [d for d in result.doubts if "momentum steps near" in d]
     assert abs(float(said.split()[4]) - 801) <= 6 and result.settings["arcs"] == 2
@@ -241,12 +223,10 @@ def test_trap_wheels_taken_for_each_other_between_slews():
     tlm = flight().telemetry
     one, two = tlm.channel("wheel_rate_RWA1"), tlm.channel("wheel_rate_RWA2")
     after = one.tai_ns > tlm.epoch_ns + 1150 * NS
-    swapped = {
-        "wheel_rate_RWA1": replace(one, values=np.where(after, two.values, one.values)),
-        "wheel_rate_RWA2": replace(two, values=np.where(after, one.values, two.values)),
-    }
+    swapped = with_values(tlm, one.name, np.where(after, two.values, one.values))
+    swapped = with_values(swapped, two.name, np.where(after, one.values, two.values))
     with pytest.raises(BadInput, match="RWA1 and RWA2 were mistaken for each other from 1"):
-        inertia_tensor(replace(tlm, channels=tlm.channels | swapped), CASSINI)
+        inertia_tensor(swapped, CASSINI)
 
 
 @pytest.mark.slow
@@ -256,9 +236,7 @@ def test_trap_a_wheel_replaced_on_its_date():
     switch = tlm.epoch_ns + 1150 * NS
     c = tlm.channel("wheel_rate_RWA4")
     old = replace(c.where(c.tai_ns < switch), name="wheel_rate_RWA3")
-    new = c.where(c.tai_ns >= switch)
-    channels = {n: x for n, x in tlm.channels.items() if n != "wheel_rate_RWA4"}
-    both = replace(tlm, channels=channels | {"wheel_rate_RWA3": old, "wheel_rate_RWA4": new})
+    both = with_channels(without(tlm, c.name), old, c.where(c.tai_ns >= switch))
     dates = {"RWA3": {"valid_to": switch}, "RWA4": {"valid_from": switch}}
     wheels = tuple(w.model_copy(update=dates.get(w.name, {})) for w in CASSINI.wheels)
     result = inertia_tensor(both, CASSINI.model_copy(update={"wheels": wheels}))
@@ -270,8 +248,8 @@ def test_trap_a_wheel_replaced_on_its_date():
 
 def test_trap_nothing_to_learn_from_a_hold():
     with pytest.raises(BadInput, match="hardly turns"):
-        inertia_tensor(fly("quiet", duration="400 s").telemetry, CASSINI)
-    bare = without(without(flight().telemetry, "quaternion"), "body_rate")
+        inertia_tensor(flown("quiet", duration="400 s").telemetry, CASSINI)
+    bare = without(flight().telemetry, "quaternion", "body_rate")
     with pytest.raises(BadInput, match="how the body turned is not known"):
         inertia_tensor(bare, CASSINI)
     with pytest.raises(BadInput, match="no inertia method"):
@@ -282,16 +260,16 @@ def test_trap_nothing_to_learn_from_a_hold():
 
 
 def test_golden_keys_of_the_record(tmp_path):
-    write_table(flight().telemetry, tmp_path / "slews.csv")
-    answer = run("inertia", tmp_path / "slews.csv", "--json", "--plot", tmp_path / "slews.png")
+    file = saved(flight().telemetry, tmp_path)
+    answer = run("inertia", file, "--json", "--plot", tmp_path / "slews.png")
     assert answer.code == 0, answer.err
     record = json.loads(answer.out)
     assert {"command", "method", "inertia_kgm2", "sigma_random_kgm2", "sigma_systematic_kgm2", "rank", "singular_values",
             "external_torque_Nm", "external_torque_sigma_Nm", "residual_rms_Nms", "slews", "doubts", "provenance"} <= set(record)  # fmt: skip
     assert record["method"] == "consistent" and record["rank"] == 6 and len(record["slews"]) == 4
     assert np.shape(record["inertia_kgm2"]) == (3, 3) and (tmp_path / "slews.png").stat().st_size > 20_000
-    assert "no inertia method" in complaint("inertia", tmp_path / "slews.csv", "--method", "best")
-    assert "scale error" in complaint("inertia", tmp_path / "slews.csv", "--wheel-error", "3")
+    assert "no inertia method" in complaint("inertia", file, "--method", "best")
+    assert "scale error" in complaint("inertia", file, "--wheel-error", "3")
 
 
 def test_law_the_entry_of_the_store_holds_all_elements_with_total_sigma():
@@ -303,9 +281,7 @@ def test_law_the_entry_of_the_store_holds_all_elements_with_total_sigma():
 
 
 def test_inspiresat1_by_kicks_of_its_wheels():
-    craft = load_craft("inspiresat1")
-    tlm = load_telemetry(flight_data("inspiresat1/is1_adcs_1hz.csv"), channels=ROOT / "examples" / "inspiresat1.toml")
-    result = inertia_tensor(tlm, craft)
+    result = inertia_tensor(inspiresat1(), load_craft("inspiresat1"))
     assert result.relative and result.record()["inertia_kgm2"] is None
     assert result.excitation.untold == ("Izz",)
     x, y = result.inertia[0, 0], result.inertia[1, 1]
@@ -314,7 +290,6 @@ def test_inspiresat1_by_kicks_of_its_wheels():
 
 
 def test_iss_says_what_it_cannot_tell():
-    tlm = load_telemetry(flight_data("iss/iss_20181012_hours_00_12.csv.gz"), channels=ROOT / "examples" / "iss.toml")
-    result = inertia_tensor(tlm, load_craft("iss"))
+    result = inertia_tensor(iss(), load_craft("iss"))
     assert {"Ixx", "Iyy", "Izz"} <= set(result.excitation.untold)
     assert any("the data alone do not tell" in d for d in result.doubts)

@@ -8,8 +8,7 @@ from asflown.craft.model import tensor
 from asflown.estimate.inertia.prediction import ROWS, Prediction, compare_inertia, predicted_inertia
 from asflown.kit.errors import BadInput
 from asflown.kit.timeline import utc_to_tai_ns
-
-CASSINI = load_craft("cassini")
+from flights import CASSINI
 
 #: 001 Table 1: predicted, estimated, error, in the order of its rows; percent for moments, kg m2 for products.
 TABLE_1 = {

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from asflown.craft.load import load_craft
 from asflown.dynamics.flyby import flyby_called
 from asflown.dynamics.plume import as_passed, plume_density, published_jets
 from asflown.estimate.density.along_flyby import density
@@ -15,23 +14,16 @@ from asflown.estimate.jets.data import through_loop
 from asflown.estimate.jets.fit import jets
 from asflown.estimate.jets.surface import WIDTHS_RAD, Surface
 from asflown.kit.errors import BadInput
-from asflown.sim.flight.closed_loop import fly
-from asflown.telemetry.tables import write_table
 from cli.program import complaint, run
+from flights import CASSINI, past_e3, saved
 
-CASSINI = load_craft("cassini")
 E3 = flyby_called("E3")
 CLOSEST_S = 180.0
 TRUTH = {"Alexandria": 0.55e-12, "Cairo": 10.3e-12, "Damascus": 8.5e-12}  # 004 Table 3; all 0.36 rad wide
 
 
-@cache
 def flown(seed=3, exponent=1, noise="nominal"):
-    plume = {"shape": "plume", "closest_approach": f"{CLOSEST_S} s", "exponent": exponent}
-    f = fly(
-        "quiet", craft=CASSINI, epoch="2008-03-12T19:03:12", duration="480 s", seed=seed, noise=noise, torques=[plume]
-    )
-    return f.telemetry
+    return past_e3(seed, exponent, noise=noise).telemetry
 
 
 def fitted(seed=3, exponent=1, noise="nominal", **how):
@@ -232,9 +224,7 @@ def test_it_refuses_a_record_that_ends_before_the_plume_and_a_flyby_without_plac
 
 
 def test_the_verb(tmp_path):
-    path = tmp_path / "e3.csv"
-    write_table(flown(), path)
-    words = ("jets", path, "--flyby", "E3", "--closest-approach", "180", "--method", "momentum")
+    words = ("jets", saved(flown(), tmp_path), "--flyby", "E3", "--closest-approach", "180", "--method", "momentum")
     done = run(*words, "--sources", "cairo,damascus", "--widths", "common", "--json", "--plot", tmp_path / "j.svg")
     assert done.code == 0
     record = done.record
@@ -251,5 +241,5 @@ def test_the_verb(tmp_path):
 ])  # fmt: skip
 def test_the_verb_refuses(words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    write_table(flown(), tmp_path / "t.csv")
+    saved(flown(), tmp_path)
     complaint("jets", "t.csv", "--flyby", "E3", "--closest-approach", "180", *words)

@@ -16,11 +16,10 @@ from asflown.estimate.leak.papers_monitor import signs_of
 from asflown.estimate.leak.watch import LeakWatch, leak
 from asflown.kit.errors import BadInput
 from asflown.kit.rotations import quaternion, rotation
-from asflown.sim.flight.closed_loop import fly
 from asflown.telemetry.load import load_telemetry
-from asflown.telemetry.tables import write_table
 from cli.program import complaint, run
 from conftest import flight_data
+from flights import flown, renamed, saved, with_channels, with_values, without
 
 CASSINI = load_craft("cassini", cm=(0, 0, 1.35))
 #: 001 section IV names polarities only; these follow from its eq 16, as the sign of the impulse.
@@ -30,11 +29,7 @@ NO_FAULT = {"thruster_faults": []}
 
 def leaking(thruster: str, size_mN: float, seed: int = 1, start_s: float = 900.0, lasts_s: float = 600.0):
     fault = {"thruster": thruster, "start": f"{start_s} s", "leak": f"{size_mN} mN"}
-    return fly("leak", seed=seed, duration=f"{start_s + lasts_s} s", thruster_faults=[fault])
-
-
-def without(tlm, *stems: str):
-    return replace(tlm, channels={n: c for n, c in tlm.channels.items() if c.kind.stem not in stems})
+    return flown("leak", seed=seed, duration=f"{start_s + lasts_s} s", thruster_faults=[fault])
 
 
 def cut(tlm, until_s: float):
@@ -91,7 +86,7 @@ def test_law_a_stream_that_changes_its_past_begins_anew(leak_of_z3):
 
 def test_law_momentum_that_orders_explain_is_none():
     """Without noise the residual of a whole wheel biasing is that of what its pulses owe and the lags believed."""
-    f = fly("wheel-bias-fsds", noise="none", seed=3)
+    f = flown("wheel-bias-fsds", noise="none", seed=3)
     use = f.scenario.thrusters
     r = leak(f.telemetry, load_craft("cassini@001-fsds", cm=use.center_of_mass), thrust_N=use.thrust)
     gained = 2 * 1.234 * use.thrust * 28.0  # N m s, by Y2 and Y4
@@ -103,11 +98,10 @@ def test_law_the_frame_of_the_quaternion_does_not_matter(leak_of_z3):
     names = [f"quaternion_{m}" for m in "wxyz"]
     q = rotation(np.stack([tlm.channel(n).values for n in names], axis=1))
     turned = quaternion(rotation([0.5, 0.5, -0.5, 0.5]) * q).T
-    other = replace(
-        tlm,
-        channels=tlm.channels | {n: replace(tlm.channel(n), values=v) for n, v in zip(names, turned, strict=True)},
+    columns = [replace(tlm.channel(n), values=v) for n, v in zip(names, turned, strict=True)]
+    assert leak(with_channels(tlm, *columns), CASSINI).statistic == pytest.approx(
+        leak(tlm, CASSINI).statistic, rel=1e-6
     )
-    assert leak(other, CASSINI).statistic == pytest.approx(leak(tlm, CASSINI).statistic, rel=1e-6)
 
 
 def test_law_threshold_and_rate():
@@ -140,7 +134,7 @@ def test_recovery_every_thruster_has_its_name(thruster):
 
 
 def test_recovery_a_quiet_hour_is_quiet():
-    f = fly("leak", seed=4, **NO_FAULT)
+    f = flown("leak", seed=4, **NO_FAULT)
     for method in ("likelihood", "threshold"):
         r = leak(f.telemetry, CASSINI, method=method)
         assert not r.alarm and r.thruster is None and r.posterior is None and r.torque_Nm is None
@@ -151,7 +145,7 @@ def test_recovery_a_quiet_hour_is_quiet():
 
 @pytest.mark.parametrize("scenario", ["wheel-bias-fsds", "wheel-bias-day28", "rcs-burn", "slews-axes"])
 def test_recovery_thrusters_and_slews_alone_raise_no_alarm(scenario):
-    f = fly(scenario, seed=11)
+    f = flown(scenario, seed=11)
     use = f.scenario.thrusters
     name = "cassini@001-fsds" if scenario == "wheel-bias-fsds" else "cassini"
     craft = load_craft(name, cm=use.center_of_mass if use else (0, 0, 1.35))
@@ -169,7 +163,7 @@ def test_recovery_a_weak_thruster_is_found_while_it_fires():
 
 def test_recovery_a_torque_no_thruster_makes_is_doubted():
     push = [{"shape": "table", "axis": "z", "times": "0 900 901 1500 s", "torques": "0 0 0.002 0.002 N m"}]
-    f = fly("leak", seed=2, duration="1500 s", torques=push, **NO_FAULT)
+    f = flown("leak", seed=2, duration="1500 s", torques=push, **NO_FAULT)
     r = leak(f.telemetry, CASSINI)
     assert r.alarm and any("does not point as any thruster's" in d for d in r.doubts)
 
@@ -178,7 +172,7 @@ def test_recovery_a_torque_no_thruster_makes_is_doubted():
 def test_recovery_false_alarms_stay_below_their_rate():
     """Sixty quiet hours at half an alarm an hour: 39 % of them may have one; 0.39 + 3 sigma."""
     alarms = [
-        leak(fly("leak", seed=2000 + k, **NO_FAULT).telemetry, CASSINI, false_alarms_per_hour=0.5).alarm
+        leak(flown("leak", seed=2000 + k, **NO_FAULT).telemetry, CASSINI, false_alarms_per_hour=0.5).alarm
         for k in range(60)
     ]
     assert 0.05 < np.mean(alarms) < 0.39 + 3 * np.sqrt(0.39 * 0.61 / 60)
@@ -204,7 +198,7 @@ def test_recovery_the_smallest_leak_stated_is_found_and_named():
 
 
 def biasing(**changes):
-    f = fly("wheel-bias-fsds", seed=5, **changes)
+    f = flown("wheel-bias-fsds", seed=5, **changes)
     return (
         f.telemetry,
         load_craft("cassini@001-fsds", cm=f.scenario.thrusters.center_of_mass),
@@ -241,18 +235,15 @@ def test_missing_on_times_are_said():
 
 def test_a_counter_that_starts_again_loses_one_step():
     tlm, craft, thrust = biasing()
-    c = tlm.channel("on_time_Y2")
-    again = replace(c, values=np.where(np.arange(len(c.values)) > 150, c.values - c.values[150], c.values))
-    r = leak(replace(tlm, channels=tlm.channels | {c.name: again}), craft, thrust_N=thrust)
+    v = tlm.channel("on_time_Y2").values
+    again = with_values(tlm, "on_time_Y2", np.where(np.arange(len(v)) > 150, v - v[150], v))
+    r = leak(again, craft, thrust_N=thrust)
     assert not r.alarm and any("taken up anew" in d for d in r.doubts)
 
 
 def test_refused_a_thruster_the_craft_has_not(leak_of_z3):
-    tlm = leak_of_z3.telemetry
-    c = tlm.channel("on_time_Z1")
-    wrong = {n: v for n, v in tlm.channels.items() if n != c.name} | {"on_time_Q9": replace(c, name="on_time_Q9")}
     with pytest.raises(BadInput, match="no thruster 'Q9'"):
-        leak(replace(tlm, channels=wrong), CASSINI)
+        leak(renamed(leak_of_z3.telemetry, {"Z1": "Q9"}, "on_time"), CASSINI)
 
 
 def test_refused_without_centre_of_mass_thrusters_or_time(leak_of_z3):
@@ -275,7 +266,7 @@ def test_recovery_the_right_thruster_with_a_centre_of_mass_only_assumed(name):
     """The true one is off by what is assumed of it; thrusters along y turn the craft by an arm along z."""
     fault = {"thruster": name, "start": "600 s", "leak": "1 mN"}
     where = {"control": False, "center_of_mass": "0.1 -0.1 0.85 m"}
-    flight = fly("leak", seed=4, duration="1200 s", thruster_faults=[fault], thrusters=where)
+    flight = flown("leak", seed=4, duration="1200 s", thruster_faults=[fault], thrusters=where)
     found = leak(flight.telemetry, load_craft("cassini"))
     assert found.alarm and found.thruster == name and found.posterior[name] > 0.95
 
@@ -284,8 +275,7 @@ def test_recovery_the_right_thruster_with_a_centre_of_mass_only_assumed(name):
 
 
 def test_verb_says_it_in_text_json_and_picture(leak_of_z3, tmp_path):
-    file = tmp_path / "t.csv"
-    write_table(leak_of_z3.telemetry, file)
+    file = saved(leak_of_z3.telemetry, tmp_path)
     done = run("leak", file, "--cm", "0,0,1.35", "--plot", tmp_path / "l.png")
     assert done.code == 3 and "Z3 leaks (or Z3 of branch B)" in done.out and "papers' monitor" in done.out
     assert (tmp_path / "l.png").stat().st_size > 20_000
@@ -312,8 +302,7 @@ def test_verb_says_it_in_text_json_and_picture(leak_of_z3, tmp_path):
 
 def test_verb_takes_and_shows_what_is_known(leak_of_z3, tmp_path):
     """A looser torque from outside hides a leak longer; every sigma said is in the JSON and in the text."""
-    file = tmp_path / "t.csv"
-    write_table(leak_of_z3.telemetry, file)
+    file = saved(leak_of_z3.telemetry, tmp_path)
     loose = [
         "--torque-sigma",
         "3e-5 N m",
@@ -340,8 +329,7 @@ def test_verb_takes_and_shows_what_is_known(leak_of_z3, tmp_path):
 
 
 def test_verb_follows_a_file_that_grows(leak_of_z3, tmp_path):
-    whole, file = tmp_path / "whole.csv", tmp_path / "grows.csv"
-    write_table(leak_of_z3.telemetry, whole)
+    whole, file = saved(leak_of_z3.telemetry, tmp_path), tmp_path / "grows.csv"
     data = whole.read_bytes()
 
     def grow():
@@ -358,8 +346,7 @@ def test_verb_follows_a_file_that_grows(leak_of_z3, tmp_path):
 
 
 def test_verb_follows_to_the_end_of_a_quiet_file(leak_of_z3, tmp_path):
-    file = tmp_path / "t.csv"
-    write_table(cut(leak_of_z3.telemetry, 600), file)
+    file = saved(cut(leak_of_z3.telemetry, 600), tmp_path)
     done = run("leak", file, "--cm", "0,0,1.35", "--follow", "--patience", "1", "--json")
     assert done.code == 0 and done.record["alarm"] is False
     assert "nothing has been written" in complaint(

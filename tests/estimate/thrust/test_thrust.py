@@ -1,7 +1,5 @@
 """Thrust as flown: 001's simulation and its day 28, laws of the model, recovery, faults, and what is refused."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -18,10 +16,10 @@ from asflown.kit.banded import Covariance
 from asflown.kit.errors import BadInput
 from asflown.sim.flight.closed_loop import fly
 from asflown.telemetry.load import load_telemetry
-from asflown.telemetry.tables import write_table
 from asflown.telemetry.telemetry import Channel, Telemetry
 from cli.program import complaint, run
 from conftest import flight_data
+from flights import changed, flown, renamed, saved, with_channels, with_values, without
 
 NAMES = ("Z1", "Z2", "Z3", "Z4", "Y1", "Y2", "Y3", "Y4")
 CASSINI = load_craft("cassini", cm=(0, 0, 1.35))
@@ -31,9 +29,9 @@ ON_TIMES = np.array([0.74, 1.72, 4.28, 3.31, 9.81, 0.375, 9.81, 0.375])
 RATES = np.array([-794.0, -870.0, -296.0])
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def fsds():
-    return fly("wheel-bias-fsds")
+    return flown("wheel-bias-fsds")
 
 
 @pytest.fixture(scope="module")
@@ -49,27 +47,11 @@ def burn():
     return fly("rcs-burn", craft=craft, thrusters={"thrust": "0.7 N", "fall": "55 ms"})
 
 
-def only(tlm: Telemetry, keep) -> Telemetry:
-    return replace(tlm, channels={n: c for n, c in tlm.channels.items() if keep(c)})
-
-
-def uncounted(tlm: Telemetry) -> Telemetry:
-    return only(tlm, lambda c: c.kind.stem != "pulse_count")
-
-
-def with_values(tlm: Telemetry, name: str, values) -> Telemetry:
-    return replace(tlm, channels=tlm.channels | {name: replace(tlm.channel(name), values=np.asarray(values))})
-
-
 def every(tlm: Telemetry, count: int) -> Telemetry:
     """Only every ``count``-th reading of the thrusters' counters."""
-
-    def thinned(c: Channel) -> Channel:
-        if c.kind.stem not in ("on_time", "pulse_count"):
-            return c
-        return c.where(np.arange(len(c.values)) % count == 0)
-
-    return replace(tlm, channels={n: thinned(c) for n, c in tlm.channels.items()})
+    for stem in ("on_time", "pulse_count"):
+        tlm = changed(tlm, stem, lambda c: c.where(slice(None, None, count)))
+    return tlm
 
 
 # ---- published ----------------------------------------------------------------------------------------------
@@ -240,7 +222,7 @@ def test_recovery_of_one_weak_thruster():
 def test_recovery_with_coarse_on_times(day28, count, counted):
     """Every 16 and 64 s, with and without pulse counts: within what is stated, which stays below 001's 10 %."""
     tlm = every(day28.telemetry, count)
-    result = thrust(tlm if counted else uncounted(tlm), CASSINI)
+    result = thrust(tlm if counted else without(tlm, "pulse_count"), CASSINI)
     assert abs(result.mean_thrust_N - 0.7) < 2.5 * result.mean_sigma_N < 0.25
     assert result.mean_sigma_N < 0.1 * 0.7
 
@@ -316,8 +298,7 @@ def test_counter_reset_is_left_out_and_told(day28):
 
 
 def test_missing_pulse_counts_are_told(day28):
-    one = only(day28.telemetry, lambda c: c.name != "pulse_count_Y1")
-    result = thrust(one, CASSINI)
+    result = thrust(without(day28.telemetry, "pulse_count_Y1"), CASSINI)
     assert not result.pulses_counted and any("not counted" in d for d in result.doubts)
 
 
@@ -326,7 +307,7 @@ def test_a_branch_that_the_craft_file_does_not_describe(day28):
 
     def with_branch(values) -> Telemetry:
         state = Channel("thruster_branch", c.tai_ns, np.asarray(values), np.ones(len(values), bool), "")
-        return replace(day28.telemetry, channels=day28.telemetry.channels | {"thruster_branch": state})
+        return with_channels(day28.telemetry, state)
 
     count = len(c.values)
     assert any("branch B" in d for d in thrust(with_branch(["B"] * count), CASSINI).doubts)
@@ -336,21 +317,14 @@ def test_a_branch_that_the_craft_file_does_not_describe(day28):
 
 def test_thrusters_misnamed_are_refused(day28):
     tlm = day28.telemetry
-    unknown = only(tlm, lambda c: True)
-    channels = dict(unknown.channels)
-    c = channels.pop("on_time_Z1")
-    channels["on_time_Q1"] = replace(c, name="on_time_Q1")
     with pytest.raises(BadInput, match="no thruster 'Q1'"):
-        thrust(replace(tlm, channels=channels), CASSINI)
+        thrust(renamed(tlm, {"Z1": "Q1"}, "on_time"), CASSINI)
     with pytest.raises(BadInput, match="no on-time of thruster Z1"):
-        thrust(only(tlm, lambda c: c.name != "on_time_Z1"), CASSINI)
-    exchanged = dict(tlm.channels)
-    for stem in ("on_time", "pulse_count"):
-        a, b = exchanged[f"{stem}_Y1"], exchanged[f"{stem}_Y2"]
-        exchanged[f"{stem}_Y1"], exchanged[f"{stem}_Y2"] = replace(b, name=a.name), replace(a, name=b.name)
+        thrust(without(tlm, "on_time_Z1"), CASSINI)
+    exchanged = renamed(tlm, {"Y1": "Y2", "Y2": "Y1"}, "on_time", "pulse_count")
     for method in ("joint", "printed"):
         with pytest.raises(BadInput, match="contradict"):
-            thrust(replace(tlm, channels=exchanged), CASSINI, method=method)
+            thrust(exchanged, CASSINI, method=method)
 
 
 def test_saturated_wheel_is_told(day28):
@@ -404,9 +378,7 @@ KEYS = {"method", "thrust_N", "sigma_N", "mean_thrust_N", "mean_sigma_N", "fall_
 
 @pytest.fixture(scope="module")
 def file28(day28, tmp_path_factory):
-    path = tmp_path_factory.mktemp("thrust") / "day28.csv"
-    write_table(day28.telemetry, path)
-    return path
+    return saved(day28.telemetry, tmp_path_factory.mktemp("thrust"))
 
 
 @pytest.mark.parametrize("method", ["joint", "printed"])

@@ -15,6 +15,7 @@ from asflown.kit.timeline import NS
 from asflown.telemetry.telemetry import Exclusion
 from conftest import flight_data
 from estimate.linear_loop import flown, respond, telemetry, triangles
+from flights import changed, renamed, scaled
 
 CASSINI = load_craft("cassini", inertia=(6570, 5226, 3400, 0, 0, 0))
 LINEAR = {p: flown(p) for p in (1, 2)}
@@ -156,8 +157,8 @@ def test_channels_may_be_sampled_at_their_own_phases():
 def test_the_coarsest_channel_widens_the_window_of_all():
     """Body rates every 12 s: a window of its own for them would make torques of what wheels and body exchange."""
     tlm, *_ = LINEAR[1]
-    coarse = {n: c.where(slice(None, None, 3)) if n.startswith("body_rate") else c for n, c in tlm.channels.items()}
-    r = disturbance_torque(replace(tlm, channels=coarse), CASSINI, axis="y", method="momentum")
+    coarse = changed(tlm, "body_rate", lambda c: c.where(slice(None, None, 3)))
+    r = disturbance_torque(coarse, CASSINI, axis="y", method="momentum")
     assert r.settings["half_width_s"] == pytest.approx(30.0)
     assert disturbance_torque(tlm, CASSINI, axis="y", window_s=4.0).settings["half_width_s"] == pytest.approx(10.0)
 
@@ -216,15 +217,6 @@ def doubts(tlm, craft=CASSINI, **how):
     return " ".join(disturbance_torque(tlm, craft, axis="y", **how).doubts)
 
 
-def scaled(tlm, stem, factor):
-    return replace(
-        tlm,
-        channels={
-            n: replace(c, values=factor * c.values) if n.startswith(stem) else c for n, c in tlm.channels.items()
-        },
-    )
-
-
 def test_a_flipped_attitude_error_raises_a_doubt_about_a_sign():
     assert "a sign is wrong" in doubts(scaled(LINEAR[1][0], "attitude_error", -1))
     assert "a sign is wrong" not in doubts(LINEAR[1][0])
@@ -239,10 +231,8 @@ def test_a_wrong_unit_raises_a_doubt(stem, factor, words):
 
 
 def test_a_wheel_the_craft_does_not_have_is_refused():
-    tlm = LINEAR[1][0]
-    channels = {n.replace("RWA4", "RWA9"): replace(c, name=n.replace("RWA4", "RWA9")) for n, c in tlm.channels.items()}
     with pytest.raises(BadInput, match=r"RWA9.*\n.*RWA1, RWA2, RWA3, RWA4"):
-        disturbance_torque(replace(tlm, channels=channels), CASSINI)
+        disturbance_torque(renamed(LINEAR[1][0], {"RWA4": "RWA9"}), CASSINI)
 
 
 def test_a_wheel_of_another_epoch_is_refused_and_the_missing_one_is_named():
@@ -273,14 +263,8 @@ def test_unknown_choices_are_refused(how):
 
 
 def test_an_unknown_spin_inertia_is_labelled_everywhere():
-    tlm = LINEAR[1][0]
-    names = dict(zip(("RWA1", "RWA2", "RWA4"), "123", strict=True))
-    channels = {}
-    for n, c in tlm.channels.items():
-        for old, new in names.items():
-            n = n.replace(old, new)
-        channels[n] = replace(c, name=n)
-    r = disturbance_torque(replace(tlm, channels=channels), load_craft("inspiresat1"), axis="y")
+    tlm = renamed(LINEAR[1][0], {"RWA1": "1", "RWA2": "2", "RWA4": "3"})
+    r = disturbance_torque(tlm, load_craft("inspiresat1"), axis="y")
     record = r.record()
     assert record["torque_Nm"] is None and record["torque_per_spin_inertia_rad_s2"] is not None
     assert "per unit spin inertia" in str(r) and any("per unit spin inertia" in d for d in r.doubts)

@@ -12,29 +12,14 @@ from asflown.craft.load import load_craft
 from asflown.estimate.wheels.run_downs import coast
 from asflown.estimate.wheels.study import LOW_SPEED, wheel_drag
 from asflown.kit.errors import BadInput
-from asflown.kit.timeline import utc_to_tai_ns
-from asflown.sim.flight.closed_loop import fly
-from asflown.telemetry.channels import kind_of
 from asflown.telemetry.load import load_telemetry
-from asflown.telemetry.tables import write_table
-from asflown.telemetry.telemetry import Channel, Telemetry
 from asflown.trends.entries.wheels import wheel_entry
 from cli.program import complaint, run
-from conftest import ROOT, flight_data
+from conftest import flight_data
+from flights import CASSINI, flown, inspiresat1, iss, saved, telemetry_of
 
-CASSINI = load_craft("cassini")
 J = 0.16138  # kg m2, RWA1
-EPOCH_NS = int(utc_to_tai_ns("2015-09-29T00:00:00"))
 NOISE = 0.005  # rad/s
-
-
-def telemetry(channels: dict, dated: bool = True) -> Telemetry:
-    """Name -> (seconds, values)."""
-    made = {}
-    for name, (t, v) in channels.items():
-        ns = EPOCH_NS + np.rint(np.asarray(t) * 1e9).astype(np.int64)
-        made[name] = Channel(name, ns, np.asarray(v, float), np.ones(len(ns), bool), kind_of(name).unit)
-    return Telemetry(made, EPOCH_NS if dated else 0, dated=dated)
 
 
 def course(t, first: float, coulomb: float, viscous: float, start: float, stop: float) -> np.ndarray:
@@ -79,7 +64,7 @@ def test_recovery_pulls_of_run_downs_are_unit_normal():
         rng = np.random.default_rng(1000 + seed)
         c, b = rng.uniform(0.001, 0.004), rng.uniform(2e-5, 6e-5)
         t, w = run_down(seed, coulomb=c, viscous=b, first=rng.uniform(60, 150), way=rng.choice([-1, 1]))
-        wheel = wheel_drag(telemetry({"wheel_rate_RWA1": (t, w)}), CASSINI).wheel("RWA1")
+        wheel = wheel_drag(telemetry_of(wheel_rate_RWA1=(t, w)), CASSINI).wheel("RWA1")
         (r,), f = wheel.run_downs, wheel.fit
         assert f.basis == "run-down" and not f.relative
         assert 200 <= r.start_s <= 216 and 1380 <= r.stop_s <= 1404
@@ -92,15 +77,14 @@ def test_recovery_pulls_of_run_downs_are_unit_normal():
 
 
 @cache
-def flown(**changes):
-    changes = {k: dict(v) if isinstance(v, tuple) else v for k, v in changes.items()}
-    flight = fly("wheel-run-down", **changes)
+def studied(seed):
+    flight = flown("wheel-run-down", seed=seed)
     return flight, wheel_drag(flight.telemetry, flight.craft)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_recovery_of_the_flown_run_down(seed):
-    _, result = flown(seed=seed)
+    _, result = studied(seed=seed)
     for name, span in (("RWA1", (120, 2520)), ("RWA2", (120, 1320))):
         wheel, f = result.wheel(name), result.wheel(name).fit
         (r,) = wheel.run_downs
@@ -121,7 +105,7 @@ def test_recovery_of_the_estimates_of_the_flight_software():
     """On a wheel that coasts, both ways to its drag agree."""
     pulls = []
     for seed in (1, 2, 3):
-        _, result = flown(seed=seed)
+        _, result = studied(seed=seed)
         for name in ("RWA1", "RWA2"):
             f = result.wheel(name).fits[1]
             assert f.basis == "flight software estimate"
@@ -131,7 +115,7 @@ def test_recovery_of_the_estimates_of_the_flight_software():
 
 def test_recovery_from_the_commanded_torque_of_wheels_without_compensation():
     for seed in (1, 2):
-        f = fly("quiet", friction=True, duration="1000 s", seed=seed, telemetry={"control_torque": "4 s"})
+        f = flown("quiet", friction=True, duration="1000 s", seed=seed, telemetry={"control_torque": "4 s"})
         result = wheel_drag(f.telemetry, f.craft)
         for w in result.wheels:
             assert w.fit.basis == "command" and not w.fit.told_apart
@@ -140,7 +124,7 @@ def test_recovery_from_the_commanded_torque_of_wheels_without_compensation():
 
 
 def test_commanded_torque_of_wheels_with_compensation_shows_no_drag():
-    f = fly(
+    f = flown(
         "quiet", friction=True, duration="1000 s", controller={"friction_compensation": True},
         telemetry={"control_torque": "4 s", "wheel_drag_torque": "0 s"},
     )  # fmt: skip
@@ -152,8 +136,8 @@ def test_commanded_torque_of_wheels_with_compensation_shows_no_drag():
 def test_several_run_downs_share_one_law_and_gaps_are_not_bridged():
     t, w = run_down(5, length=1200)
     gap = (t > 700) & (t < 780)
-    whole = wheel_drag(telemetry({"wheel_rate_RWA1": (t, w)}), CASSINI).wheel("RWA1")
-    result = wheel_drag(telemetry({"wheel_rate_RWA1": (t[~gap], w[~gap])}), CASSINI)
+    whole = wheel_drag(telemetry_of(wheel_rate_RWA1=(t, w)), CASSINI).wheel("RWA1")
+    result = wheel_drag(telemetry_of(wheel_rate_RWA1=(t[~gap], w[~gap])), CASSINI)
     parted = result.wheel("RWA1")
     assert len(whole.run_downs) == 1 and len(parted.run_downs) == 2
     assert parted.run_downs[0].stop_s <= 700 and parted.run_downs[1].start_s >= 780
@@ -169,7 +153,7 @@ def test_lost_samples_single_outliers_and_coarse_counts_leave_the_drag():
     kept = rng.random(len(t)) > 0.1
     w = np.where(np.arange(len(t)) % 97 == 50, w + 0.2, w)
     for values, coarse in ((w, 1.0), (np.round(w / 0.04) * 0.04, 3.0)):
-        f = wheel_drag(telemetry({"wheel_rate_RWA1": (t[kept], values[kept])}), CASSINI).wheel("RWA1").fit
+        f = wheel_drag(telemetry_of(wheel_rate_RWA1=(t[kept], values[kept])), CASSINI).wheel("RWA1").fit
         assert abs(f.coulomb - 0.002) < 4 * f.sigma_coulomb and f.sigma_coulomb < coarse * 1e-5
         assert abs(f.viscous - 3.5e-5) < 4 * f.sigma_viscous
 
@@ -192,7 +176,7 @@ STEADY = [{"shape": "constant", "torque": "0.005 -0.005 0.002 N m"}]
     ],
 )
 def test_in_the_loop_drag_is_not_known_and_the_result_says_so(scenario, changes):
-    flight = fly(scenario, **changes)
+    flight = flown(scenario, **changes)
     result = wheel_drag(flight.telemetry, flight.craft)
     for w in result.record()["wheels"]:
         assert w["basis"] is None and w["run_downs"] == [] and w["spikes"] is None
@@ -204,10 +188,10 @@ def test_wheels_that_slow_together_show_a_torque_not_a_bearing():
     """A torque that fades bends the courses as viscous drag would; where two wheels only trade momentum, one may coast."""
     t, w = run_down(11, before=0.0)
     lost = w - w[0]
-    alone = wheel_drag(telemetry({"wheel_rate_RWA1": (t, w), "wheel_rate_RWA2": (t, 0 * t + 50)}), CASSINI)
+    alone = wheel_drag(telemetry_of(wheel_rate_RWA1=(t, w), wheel_rate_RWA2=(t, 0 * t + 50)), CASSINI)
     assert alone.wheel("RWA1").fit is not None
     # RWA2 speeds up by as much: a torque along neither axis
-    shared = wheel_drag(telemetry({"wheel_rate_RWA1": (t, w), "wheel_rate_RWA2": (t, 50 - lost)}), CASSINI)
+    shared = wheel_drag(telemetry_of(wheel_rate_RWA1=(t, w), wheel_rate_RWA2=(t, 50 - lost)), CASSINI)
     assert shared.wheel("RWA1").fit is None and any("with other wheels" in d for d in shared.doubts)
     # before 2003 RWA4 stands parallel to RWA1: what the one loses the other takes up, and no torque acts
     spare = tuple(
@@ -215,7 +199,7 @@ def test_wheels_that_slow_together_show_a_torque_not_a_bearing():
     )
     trade = {"wheel_rate_RWA1": (t, w), "wheel_rate_RWA4": (t, 50 - lost)}
     craft = CASSINI.model_copy(update={"wheels": spare})
-    assert wheel_drag(telemetry(trade), craft).wheel("RWA1").fit is not None
+    assert wheel_drag(telemetry_of(**trade), craft).wheel("RWA1").fit is not None
 
 
 @pytest.mark.parametrize("shape", ["ramp", "let out", "braked"])
@@ -227,13 +211,13 @@ def test_a_motor_that_slows_a_wheel_is_not_a_bearing(shape):
         "braked": coast(t, 94.0, 0.06 / J, 3.5e-5 / J),
     }[shape]
     w = np.clip(w, 0, None) + NOISE * np.random.default_rng(0).standard_normal(len(t))
-    result = wheel_drag(telemetry({"wheel_rate_RWA1": (t, w)}), CASSINI)
+    result = wheel_drag(telemetry_of(wheel_rate_RWA1=(t, w)), CASSINI)
     assert result.wheel("RWA1").fit is None and any("slows evenly" in d for d in result.doubts)
 
 
 def test_a_narrow_run_down_gives_the_drag_together_where_it_is_named():
     t, w = run_down(7, length=100, before=0.0)
-    tlm = telemetry({"wheel_rate_RWA1": (t, w)})
+    tlm = telemetry_of(wheel_rate_RWA1=(t, w))
     assert wheel_drag(tlm, CASSINI).wheel("RWA1").fit is None
     result = wheel_drag(tlm, CASSINI, run_down=("RWA1",))
     f = result.wheel("RWA1").fit
@@ -253,11 +237,11 @@ def parts(result, name="RWA1"):
 
 def test_law_turning_the_other_way_moving_in_time_and_unsynchronised_wheels_change_nothing():
     t, w = run_down(8)
-    plain = wheel_drag(telemetry({"wheel_rate_RWA1": (t, w)}), CASSINI)
-    back = wheel_drag(telemetry({"wheel_rate_RWA1": (t, -w)}), CASSINI)
-    later = wheel_drag(telemetry({"wheel_rate_RWA1": (t + 5000.125, w)}), CASSINI)
+    plain = wheel_drag(telemetry_of(wheel_rate_RWA1=(t, w)), CASSINI)
+    back = wheel_drag(telemetry_of(wheel_rate_RWA1=(t, -w)), CASSINI)
+    later = wheel_drag(telemetry_of(wheel_rate_RWA1=(t + 5000.125, w)), CASSINI)
     other = (np.arange(1.3, 1500, 2.7), np.full(556, 30.0))
-    beside = wheel_drag(telemetry({"wheel_rate_RWA1": (t, w), "wheel_rate_RWA2": other}), CASSINI)
+    beside = wheel_drag(telemetry_of(wheel_rate_RWA1=(t, w), wheel_rate_RWA2=other), CASSINI)
     for result in (back, later, beside):
         assert parts(result) == pytest.approx(parts(plain), rel=1e-6)
     assert back.wheel("RWA1").run_downs[0].from_rad_s == pytest.approx(-plain.wheel("RWA1").run_downs[0].from_rad_s)
@@ -266,7 +250,7 @@ def test_law_turning_the_other_way_moving_in_time_and_unsynchronised_wheels_chan
 
 def test_law_drag_scales_with_the_spin_inertia_and_is_relative_without_one():
     t, w = run_down(9)
-    tlm = telemetry({"wheel_rate_RWA1": (t, w)})
+    tlm = telemetry_of(wheel_rate_RWA1=(t, w))
     wheels = tuple(x.model_copy(update={"spin_inertia": 2 * J if x.name == "RWA1" else x.spin_inertia}) for x in CASSINI.wheels)  # fmt: skip
     unknown = tuple(x.model_copy(update={"spin_inertia": None}) for x in CASSINI.wheels)
     plain = parts(wheel_drag(tlm, CASSINI))
@@ -290,7 +274,7 @@ def test_property_use_of_a_wheel_on_a_straight_line(first, slope, steps, low):
     assume(abs(slope) > 1e-6 or abs(abs(first) - low) > 1e-6)  # along the limit itself either answer is right
     t = np.concatenate([[0.0], np.cumsum(steps)])
     w = first + slope * t
-    c = telemetry({"wheel_rate_RWA1": (t, w)}).channel("wheel_rate_RWA1")
+    c = telemetry_of(wheel_rate_RWA1=(t, w)).channel("wheel_rate_RWA1")
     use = wheel_use(c, t, low)
     if use.gaps_s > 0:
         assert use.seen_s + use.gaps_s == pytest.approx(t[-1])
@@ -306,9 +290,9 @@ def test_property_use_of_a_wheel_on_a_straight_line(first, slope, steps, low):
 def test_a_wheel_near_rest_does_not_cross_zero_by_noise():
     t = np.arange(0.0, 2000, 4.0)
     w = 0.01 * np.cos(t / 300) + NOISE * np.random.default_rng(3).standard_normal(len(t))
-    assert wheel_drag(telemetry({"wheel_rate_RWA1": (t, w)}), CASSINI).wheel("RWA1").use.zero_crossings == 0
+    assert wheel_drag(telemetry_of(wheel_rate_RWA1=(t, w)), CASSINI).wheel("RWA1").use.zero_crossings == 0
     w = 2 * np.cos(t / 300) + NOISE * np.random.default_rng(3).standard_normal(len(t))
-    use = wheel_drag(telemetry({"wheel_rate_RWA1": (t, w)}), CASSINI).wheel("RWA1").use
+    use = wheel_drag(telemetry_of(wheel_rate_RWA1=(t, w)), CASSINI).wheel("RWA1").use
     assert use.zero_crossings == 2
     assert use.crossing_times_s == pytest.approx(300 * np.pi * np.array([0.5, 1.5]), abs=3)
     assert use.low_speed_dwell_s == pytest.approx(t[-1])
@@ -321,7 +305,7 @@ def test_estimates_of_the_flight_software_in_three_conventions(kind):
     w = 60 * np.cos(t / 500)
     drag = 0.002 * np.tanh(w / 0.02) + 3.5e-5 * w + 2e-4 * rng.standard_normal(len(t))
     drag = {"opposing": drag, "on the wheel": -drag, "size": drag * np.sign(w)}[kind]
-    result = wheel_drag(telemetry({"wheel_rate_RWA1": (t, w), "wheel_drag_torque_RWA1": (t + 0.5, drag)}), CASSINI)
+    result = wheel_drag(telemetry_of(wheel_rate_RWA1=(t, w), wheel_drag_torque_RWA1=(t + 0.5, drag)), CASSINI)
     f = result.wheel("RWA1").fit
     assert abs(f.coulomb - 0.002) < 4 * f.sigma_coulomb and abs(f.viscous - 3.5e-5) < 4 * f.sigma_viscous
     assert result.wheel("RWA1").spikes == ()
@@ -334,21 +318,21 @@ def test_estimates_of_the_flight_software_in_three_conventions(kind):
 def test_bad_input():
     t = np.arange(0.0, 100.0, 4.0)
     with pytest.raises(BadInput, match=r"no wheel rates(.|\n)*body_rate_x"):
-        wheel_drag(telemetry({"body_rate_x": (t, 0 * t)}), CASSINI)
+        wheel_drag(telemetry_of(body_rate_x=(t, 0 * t)), CASSINI)
     with pytest.raises(BadInput, match="has no wheel 'W9'"):
-        wheel_drag(telemetry({"wheel_rate_W9": (t, t)}), CASSINI)
+        wheel_drag(telemetry_of(wheel_rate_W9=(t, t)), CASSINI)
     with pytest.raises(BadInput, match="not positive"):
-        wheel_drag(telemetry({"wheel_rate_RWA1": (t, t)}), CASSINI, low_speed=0.0)
+        wheel_drag(telemetry_of(wheel_rate_RWA1=(t, t)), CASSINI, low_speed=0.0)
     with pytest.raises(BadInput, match="no rate of wheel 'RWA2'"):
-        wheel_drag(telemetry({"wheel_rate_RWA1": (t, t)}), CASSINI, run_down=("RWA2",))
+        wheel_drag(telemetry_of(wheel_rate_RWA1=(t, t)), CASSINI, run_down=("RWA2",))
     with pytest.raises(BadInput, match="does not slow down"):
-        wheel_drag(telemetry({"wheel_rate_RWA1": (t, 10 + t)}), CASSINI, run_down=("RWA1",))
+        wheel_drag(telemetry_of(wheel_rate_RWA1=(t, 10 + t)), CASSINI, run_down=("RWA1",))
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 5])
 def test_a_few_samples_are_no_error(count):
     t = 4.0 * np.arange(count)
-    c = telemetry({"wheel_rate_RWA1": (t, 5 + 0 * t), "wheel_drag_torque_RWA1": (t, 0.002 + 0 * t)})
+    c = telemetry_of(wheel_rate_RWA1=(t, 5 + 0 * t), wheel_drag_torque_RWA1=(t, 0.002 + 0 * t))
     result = wheel_drag(c, CASSINI)
     assert result.wheel("RWA1").fit is None and result.record()["wheels"][0]["zero_crossings"] == 0
     none = replace(c.channel("wheel_rate_RWA1"), valid=np.zeros(count, bool))
@@ -359,7 +343,7 @@ def test_a_few_samples_are_no_error(count):
 
 
 def test_entry_for_the_store():
-    flight, result = flown(seed=1)
+    flight, result = studied(seed=1)
     entry = wheel_entry(result, flight.telemetry, flight.craft, "run-down-2015-272", {"seed": 1})
     assert (entry.kind, entry.craft, entry.date) == ("wheels", "cassini", "2015-09-29T00:00:00")
     stems = ("coulomb_drag", "viscous_drag", "drag_spikes", "low_speed_dwell", "zero_crossings", "revolutions")
@@ -368,7 +352,7 @@ def test_entry_for_the_store():
     f = result.wheel("RWA1").fit
     assert (value.value, value.sigma, value.unit) == (f.coulomb, f.sigma_coulomb, "N m")
     assert entry.value("drag_spikes_RWA4", "telemetry").value == 1 and entry.doubts == result.doubts
-    quiet = fly("quiet")
+    quiet = flown("quiet")
     entry = wheel_entry(wheel_drag(quiet.telemetry, quiet.craft), quiet.telemetry, quiet.craft, "q", {})
     assert entry.value("coulomb_drag_RWA1", "telemetry").value is None
     assert entry.value("drag_spikes_RWA1", "telemetry").value is None
@@ -382,9 +366,8 @@ KEYS = {"name", "coulomb_Nm", "sigma_coulomb_Nm", "viscous_Nms", "sigma_viscous_
 
 
 def test_the_verb(tmp_path):
-    flight, result = flown(seed=1)
-    path = tmp_path / "t.csv"
-    write_table(flight.telemetry, path)
+    flight, result = studied(seed=1)
+    path = saved(flight.telemetry, tmp_path)
     done = run("wheels", path, "--json", "--plot", tmp_path / "w.svg")
     assert done.code == 0 and done.err == f"wrote {tmp_path / 'w.svg'}\n"
     assert (tmp_path / "w.svg").read_text().startswith("<?xml")
@@ -403,9 +386,8 @@ def test_the_verb(tmp_path):
 
 
 def test_the_verb_refuses(tmp_path):
-    flight, _ = flown(seed=1)
-    path = tmp_path / "t.csv"
-    write_table(flight.telemetry, path)
+    flight, _ = studied(seed=1)
+    path = saved(flight.telemetry, tmp_path)
     for words in (["--low-speed", "300"], ["--low-speed", "300 s"], ["--low-speed", "-3 rpm"], ["--run-down", "RWA9"],
                   ["--run-down", "RWA1", "--start", "2600"], ["--plot", tmp_path / "w.txt"], ["--craft", "iss"]):  # fmt: skip
         complaint("wheels", path, *words)
@@ -416,17 +398,15 @@ def test_the_verb_refuses(tmp_path):
 
 
 def test_inspiresat1_drag_is_not_known_but_its_wheels_dwell():
-    tlm = load_telemetry(flight_data("inspiresat1/is1_adcs_1hz.csv"), channels=ROOT / "examples" / "inspiresat1.toml")
-    result = wheel_drag(tlm, load_craft("inspiresat1"))
+    result = wheel_drag(inspiresat1(), load_craft("inspiresat1"))
     assert all(w.fit is None for w in result.wheels)
     assert [w.use.zero_crossings for w in result.wheels] == [1, 0, 1]
     assert [w.use.low_speed_dwell_s for w in result.wheels] == pytest.approx([475, 0, 475])
 
 
 def test_space_station_has_no_wheels():
-    tlm = load_telemetry(flight_data("iss/iss_20181012_hours_00_12.csv.gz"), channels=ROOT / "examples" / "iss.toml")
     with pytest.raises(BadInput, match="no wheel rates"):
-        wheel_drag(tlm, load_craft("iss"))
+        wheel_drag(iss(), load_craft("iss"))
 
 
 @pytest.mark.parametrize("name", ["torque1", "cover", "slew", "bias", "bias_fsds"])

@@ -18,10 +18,10 @@ the flyby's geometry allow, else that of the estimated curve.
 from __future__ import annotations
 
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...craft.model import Craft
 from ...dynamics.environment import gravity_gradient, gravity_gradient_bound
 from ...dynamics.flyby import Flyby, flyby_called, published_peaks
 from ...dynamics.plume import FARTHEST_M, Jet, sources_passed
@@ -29,7 +29,6 @@ from ...kit.ensemble import spread
 from ...kit.errors import BadInput, some_of
 from ...kit.timeline import utc_label
 from ...telemetry.channels import AXES
-from ...telemetry.telemetry import Telemetry
 from ..firing import gained
 from ..subject import check_on_times, slews, subject_of, thrusters_firing
 from ..torque import METHODS, disturbance_torque, torque_on_times
@@ -38,6 +37,10 @@ from .axes import agreement_of, drawn_densities, tells, weights
 from .drag import PRINTED_SHAPE, DragAlong, flyby_drag
 from .peak import TIME_STEP_S, DrawnPeaks, draw_peaks
 from .result import Beside, DensityPeak, DensityResult, Noticed, total
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ...telemetry.telemetry import Telemetry
 
 #: The part of a record that a result shows, either side of closest approach. [s]
 REACH_S = 600.0

@@ -9,13 +9,16 @@ minimum.  Intervals are where the misfit, least over all else, is below its limi
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import f as fisher
 
-from ...dynamics.flyby import Flyby
 from ...kit.errors import BadInput
-from ..firing import Gained
+
+if TYPE_CHECKING:
+    from ...dynamics.flyby import Flyby
+    from ..firing import Gained
 
 #: Scale heights tried [m], then as many again within those that fit, and instants within a step at which the atmosphere is summed.
 _HEIGHTS_M = np.geomspace(10e3, 300e3, 401)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ...kit.regression import memory
-from ..torque import TorqueResult
 from .result import Agreement
+
+if TYPE_CHECKING:
+    from ..torque import TorqueResult
 
 #: Gas tells by its torque where it turns the craft by at least this share of the most it does along the flyby.
 _LEAST_ARM = 0.1

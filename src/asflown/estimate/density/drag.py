@@ -9,15 +9,18 @@ from __future__ import annotations
 import csv
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...craft.model import Aerodynamics, Craft
 from ...dynamics.drag import PRINTED_E3, torque_per_density
-from ...dynamics.flyby import Flyby
 from ...kit.errors import BadInput
 from ...kit.quantities import si_factor
 from ...telemetry.channels import AXES, split_header
+
+if TYPE_CHECKING:
+    from ...craft.model import Aerodynamics, Craft
+    from ...dynamics.flyby import Flyby
 
 #: What 004 judges its torque to be off by, and what else is (section VI): their root sum of squares is 7.73 %.
 PRINTED_SHAPE, PRINTED_SCALE = 0.05, 0.059

@@ -17,14 +17,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from ...dynamics.flyby import Flyby
 from ...dynamics.plume import FARTHEST_M, Jet, jet_density
 from ..fused import AxisData, Regression, regression
 from .axes import tells
+
+if TYPE_CHECKING:
+    from ...dynamics.flyby import Flyby
 
 POWERS = (1.0, 1.4, 2.0)
 #: Steps of 2.6 %: of 11 % they are wider than the posterior, which then sits on one of them and says too little.

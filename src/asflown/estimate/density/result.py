@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import chi2
 
-from ...dynamics.flyby import Flyby, PublishedPeak
-from ..fused import AxisData
-from .atmosphere import AtmosphereFit
-from .drag import DragAlong
+if TYPE_CHECKING:
+    from ...dynamics.flyby import Flyby, PublishedPeak
+    from ..fused import AxisData
+    from .atmosphere import AtmosphereFit
+    from .drag import DragAlong
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,6 @@
 """The steady external torque, from the momentum that craft and wheels gain."""
 
-from .result import AXES, ExternalTorque
+from .result import ExternalTorqueResult
 from .steady import external_torque
 
-__all__ = [
-    "AXES", "ExternalTorque", "external_torque",
-]  # fmt: skip
+__all__ = ["ExternalTorqueResult", "external_torque"]

@@ -16,34 +16,38 @@ of the residuals times how many of them are worth one (``kit.regression.memory``
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
 
-from ...craft.model import Craft
-from ...kit.errors import BadInput, some_of
+from ...kit.doubts import Doubt, Doubts, Kind, Severity
+from ...kit.errors import BadInput, check_choice, some_of
 from ...kit.regression import robust_line
+from ...kit.result import recorded
 from ...kit.rotations import rotation, turned_by
 from ...kit.timeline import NS
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
-from ...telemetry.telemetry import Telemetry
 from ..subject import (
     FEWEST,
     GYRO_BIAS,
     INERTIA_SHARE,
+    PER_SPIN_INERTIA,
     SPIN_SHARE,
     UNTOLD_TURN,
     Samples,
     Subject,
     samples_of,
-    slews,
     subject_of,
-    thrusters_firing,
 )
 from .regress import OUTLYING, Fit, regress
-from .result import ExternalTorque
+from .result import ExternalTorqueResult
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ...telemetry.telemetry import Telemetry
 
 METHODS = ("drift", "momentum")
 VARIANTS = ("corrected", "printed")
@@ -57,6 +61,51 @@ _FEW_WORTH = 20  # independent samples below which a sigma is doubted
 _CHANGED = 4.0  # sigma between the torques of both halves
 
 
+PRINTED = Kind(
+    "external.printed", Severity.CAUTION, "the printed method uses two readings, without w x H, and gives no sigma",
+    "Use --variant corrected.",
+)  # fmt: skip
+OWN_SPIN_INERTIA = Kind(
+    "external.own-spin-inertia", Severity.NOTE,
+    "the paper's mean spin inertia is that of another craft's wheels: {craft}'s own is used",
+)  # fmt: skip
+TURN_FROM_GYROS = Kind(
+    "external.turn-from-gyros", Severity.CAUTION, "the craft's turn is measured by its gyros, whose bias counts as turn",
+    "Add the quaternion, or give --turn-rate.",
+)  # fmt: skip
+TURN_UNKNOWN = Kind(
+    "external.turn-unknown", Severity.CAUTION, "{why}: w x H is left out, and an Earth-pointed craft is assumed",
+    "Add the quaternion, or give --turn-rate.",
+)  # fmt: skip
+ATTITUDE_FROM_RATES = Kind(
+    "external.attitude-from-rates", Severity.CAUTION,
+    "there is no quaternion: the attitude is integrated from the body rates, including their bias", "Add the quaternion.",
+)  # fmt: skip
+OUTLIERS = Kind(
+    "external.outliers", Severity.SUSPECT,
+    "{outliers} of {samples} samples lie more than {limit:.0f} sigma from the fit and are not used: is the inertia right?",
+    "Check the inertia (--inertia), and what happened at those times (--plot).",
+)  # fmt: skip
+FEW_EFFECTIVE_SAMPLES = Kind(
+    "external.few-effective-samples", Severity.CAUTION,
+    "the residuals are correlated: the effective sample size is {effective:.0f}; the torque is not constant or the inertia "
+    "is wrong, and sigma is rough",
+    "Take a longer record, or check the inertia.",
+)  # fmt: skip
+NOT_CONSTANT = Kind(
+    "external.not-constant", Severity.SUSPECT,
+    "the two halves of the span give torques that differ by {apart:.1f} sigma about {axis}: the torque is not constant in "
+    "these axes, or a known quantity is wrong",
+    "Try the other --frame, or a shorter span.",
+)  # fmt: skip
+SYSTEMATIC = Kind(
+    "external.systematic", Severity.CAUTION,
+    "errors of known quantities (spin inertia {spin_percent:.2f} %, inertia {inertia_percent:.0f} %, gyros, turn) can shift the "
+    "torque by more than its sigma, which is noise only: see the systematic column",
+)  # fmt: skip
+
+
+@recorded
 def external_torque(
     telemetry: Telemetry,
     craft: Craft,
@@ -65,32 +114,47 @@ def external_torque(
     variant: str = "corrected",
     frame: str = "body",
     turn_rad_s=None,
-) -> ExternalTorque:
-    """The constant torque on the craft that its momentum shows. [N m]
+) -> ExternalTorqueResult:
+    """The constant external torque on the craft, from the momentum that craft and wheels gain.
 
-    ``method``: 'drift' (no slews), 'momentum', or None: drift where the record holds no slew.  ``variant``: 'corrected', or
-    'printed', 001 Appendix A with its faults (drift only).  ``frame``: in which the torque is constant.  ``turn_rad_s`` (3,):
-    mean body rate for the drift's w x H, in place of that of quaternion or gyros.
+    Parameters
+    ----------
+    telemetry : Telemetry
+        Wheel rates, with body rates and quaternion where there are any.
+    craft : Craft
+        Wheels' axes and spin inertia; inertia for the momentum method.
+    method : {'drift', 'momentum'}, optional
+        'drift' fits a line to the momentum in a hold, 'momentum' a balance that slews may cross.  By default drift where the
+        record holds no slew.
+    variant : {'corrected', 'printed'}
+        'printed' is Appendix A of Lee and Wang (paper 001) with its errors: two readings, without w x H (drift only).
+    frame : {'body', 'inertial'}
+        Axes in which the torque is constant; 'inertial' is that of the quaternion.
+    turn_rad_s : array_like of shape (3,), optional
+        Mean body rate, body axes [rad/s], for the drift's w x H; from quaternion or gyros unless given.
 
-    Raises BadInput where thrusters fire, a slew is in a drift, or channels are missing."""
-    for value, allowed, what in (
-        (variant, VARIANTS, "variant"),
-        (frame, FRAMES, "frame"),
-        (method, (None, *METHODS), "method"),
-    ):
-        if value not in allowed:
-            raise BadInput(
-                f"{what} {value!r} is not known",
-                remedy=f"Choose one of: {some_of(a for a in allowed if a is not None)}.",
-            )
-    firing = thrusters_firing(telemetry)
-    if firing:
+    Returns
+    -------
+    ExternalTorqueResult
+        Torque (3,) [N m] about the centre of mass, positive as it turns the body about +axis.
+
+    Raises
+    ------
+    BadInput
+        Where thrusters fire, a drift holds a slew, or channels are missing.
+    """
+    check_choice(variant, VARIANTS, "variant")
+    check_choice(frame, FRAMES, "frame")
+    check_choice(method, (None, *METHODS), "method")
+    alternative = variant == "printed" and _PRINTED_SPIN in craft.alternatives
+    subject = subject_of(telemetry, craft.with_alternative(_PRINTED_SPIN) if alternative else craft)
+    if subject.firing:
         raise BadInput(
-            f"thrusters fire in this span ({some_of(firing)}), and what they give would be taken for the external torque",
+            f"thrusters fire in this span ({some_of(subject.firing)}), and their torque cannot be separated from the external one",
             file=telemetry.source or None,
             remedy="Narrow the span with --start and --stop to one without firings.",
         )
-    turning = slews(telemetry) or _turns_far(telemetry)
+    turning = subject.slewing or _turns_far(telemetry)
     method = method or ("momentum" if frame == "inertial" or (turning and variant == "corrected") else "drift")
     if method == "momentum" and (variant == "printed" or turn_rad_s is not None):
         raise BadInput(
@@ -109,8 +173,6 @@ def external_torque(
             remedy="Use --method momentum"
             + (", or narrow the span to a hold with --start and --stop." if turning else "."),
         )
-    alternative = variant == "printed" and _PRINTED_SPIN in craft.alternatives
-    subject = subject_of(telemetry, craft.with_alternative(_PRINTED_SPIN) if alternative else craft)
     try:
         if variant == "printed":
             result = _printed(subject, alternative)
@@ -118,10 +180,8 @@ def external_torque(
             result = _drift(subject, turn_rad_s) if method == "drift" else _momentum(subject, frame)
     except BadInput as why:
         raise why.within(telemetry.source) from why.__cause__
-    doubts = [*subject.doubts, *result.doubts]
-    if subject.relative:
-        doubts.append("the wheels' spin inertia is not known: the torque is per unit spin inertia (rad/s^2), not N m")
-    return replace(result, doubts=tuple(dict.fromkeys(doubts)))
+    found = [*subject.doubts, *result.doubts, PER_SPIN_INERTIA(what="the torque is") if subject.relative else None]
+    return replace(result, doubts=Doubts(found))
 
 
 def _turns_far(tlm: Telemetry) -> bool:
@@ -136,7 +196,7 @@ def _turns_far(tlm: Telemetry) -> bool:
     return len(tai_ns) > 1 and float(np.linalg.norm(np.median(rates, axis=0)) * np.ptp(tai_ns) / NS) > _FAR
 
 
-def _printed(subject: Subject, alternative: bool) -> ExternalTorque:
+def _printed(subject: Subject, alternative: bool) -> ExternalTorqueResult:
     """001 Appendix A: the last reading less the first, whatever lies between."""
     wheels = subject.wheels()
     tai_ns, rates = together(subject.telemetry, [c.name for c, _ in wheels])
@@ -146,26 +206,24 @@ def _printed(subject: Subject, alternative: bool) -> ExternalTorque:
     per_rate = np.array([np.array(w.axis) * (w.spin_inertia or 1.0) for _, w in wheels])
     gained = (rates - rates[0]) @ per_rate
     torque = gained[-1] / t[-1]
-    doubts = ["printed method: two readings, without w x H and without a sigma"]
-    if not alternative:
-        doubts.append(f"001's mean spin inertia is that of Cassini's wheels: {subject.craft.craft.name}'s own is used")
+    doubts = Doubts([PRINTED(), None if alternative else OWN_SPIN_INERTIA(craft=subject.craft.craft.name)])
     used = np.zeros(len(t), bool)
     used[[0, -1]] = True
-    return ExternalTorque(
+    return ExternalTorqueResult(
         craft=subject.craft.craft.name,
         epoch=subject.telemetry.epoch_label,
         method="drift",
         variant="printed",
         frame="body",
-        torque=torque,
-        momentum=(rates @ per_rate).mean(axis=0),
+        torque_Nm=torque,
+        momentum_Nms=(rates @ per_rate).mean(axis=0),
         wheel_drift_rad_s2={w.name: float(d / t[-1]) for (_, w), d in zip(wheels, rates[-1] - rates[0], strict=True)},
         time_s=subject.telemetry.seconds(tai_ns),
-        gained=gained,
-        fitted=np.outer(t, torque),
+        gained_Nms=gained,
+        fitted_Nms=np.outer(t, torque),
         used=used,
         relative=subject.relative,
-        doubts=tuple(doubts),
+        doubts=doubts,
         settings={"spin_inertia_kg_m2": [w.spin_inertia for _, w in wheels]},
     )
 
@@ -182,7 +240,7 @@ class _Course:
     G: np.ndarray
     unknown: np.ndarray
     turn_from: str
-    doubts: list[str]
+    doubts: list[Doubt]
     turn_sigma: np.ndarray | None = None
     turn: np.ndarray | None = None
     gyroscopic: np.ndarray | None = None
@@ -194,7 +252,7 @@ class _Course:
         return np.concatenate([back, back @ self.G], axis=2)
 
 
-def _drift(subject: Subject, turn) -> ExternalTorque:
+def _drift(subject: Subject, turn) -> ExternalTorqueResult:
     s = samples_of(subject)
     t, H = s.seconds, s.momentum
     w, w_sigma, turn_from, w_unknown, doubts = _turn(s, turn)
@@ -226,13 +284,9 @@ def _turn(s: Samples, given):
         w, sigma = np.array([v[1] for v, _, _ in lines]), np.sqrt([c[1, 1] for _, c, _ in lines])
         return w, sigma, "quaternion", 0.0, []
     if s.rates is not None and np.abs(w := np.median(s.rates, axis=0)).max() > 3 * GYRO_BIAS:
-        doubt = (
-            "the craft's turn is that of its gyros, whose bias counts as turn: a quaternion, or --turn-rate, would tell"
-        )
-        return w, 1.25 * s.rates.std(axis=0) / np.sqrt(len(t)), "body rates", GYRO_BIAS, [doubt]
-    what = "the gyros show no turn beyond their bias" if s.rates is not None else "nothing tells how the craft turns"
-    doubt = f"{what}: w x H is left out, a craft pointed at Earth is assumed. Give --turn-rate, or the quaternion"
-    return np.zeros(3), np.zeros(3), "nothing", UNTOLD_TURN, [doubt]
+        return w, 1.25 * s.rates.std(axis=0) / np.sqrt(len(t)), "body rates", GYRO_BIAS, [TURN_FROM_GYROS()]
+    why = "the gyros show no turn beyond their bias" if s.rates is not None else "no channel measures the craft's turn"
+    return np.zeros(3), np.zeros(3), "nothing", UNTOLD_TURN, [TURN_UNKNOWN(why=why)]
 
 
 def _crossed(H, sigma) -> np.ndarray:
@@ -241,7 +295,7 @@ def _crossed(H, sigma) -> np.ndarray:
     return np.hypot(sigma[a] * H[b], sigma[b] * H[a])
 
 
-def _momentum(subject: Subject, frame: str) -> ExternalTorque:
+def _momentum(subject: Subject, frame: str) -> ExternalTorqueResult:
     subject.known_inertia()
     s = samples_of(subject)
     if s.rates is None:
@@ -260,7 +314,7 @@ def _momentum(subject: Subject, frame: str) -> ExternalTorque:
         from_start, turn_from = Rotation.identity(), "body rates"
         turned = turned_by(t, s.rates)
         unknown = _crossed(s.momentum.mean(axis=0), np.full(3, GYRO_BIAS))
-        doubts.append("there is no quaternion: the attitude is that of the body rates added up, their bias with them")
+        doubts.append(ATTITUDE_FROM_RATES())
     if frame == "body":
         G = cumulative_trapezoid(turned.as_matrix(), t, axis=0, initial=0)
     else:
@@ -268,7 +322,7 @@ def _momentum(subject: Subject, frame: str) -> ExternalTorque:
     return _fitted(subject, s, _Course("momentum", frame, s.momentum, turned, G, unknown, turn_from, doubts))
 
 
-def _fitted(subject: Subject, s: Samples, course: _Course) -> ExternalTorque:
+def _fitted(subject: Subject, s: Samples, course: _Course) -> ExternalTorqueResult:
     tlm, fit = subject.telemetry, regress(course.rows, course.y)
     if course.turn_sigma is not None:
         fit = replace(fit, covariance=fit.covariance + np.diag(np.r_[np.zeros(3), course.turn_sigma**2]))
@@ -278,29 +332,29 @@ def _fitted(subject: Subject, s: Samples, course: _Course) -> ExternalTorque:
     )
     gained_variance = np.einsum("nij,jk,nik->ni", course.G, fit.covariance[3:, 3:], course.G)
     inertia = "inertia_per_spin_inertia" if subject.craft.relative else "inertia_kg_m2"
-    return ExternalTorque(
+    return ExternalTorqueResult(
         craft=subject.craft.craft.name,
         epoch=tlm.epoch_label,
         method=course.method,
         variant="corrected",
         frame=course.frame,
-        torque=fit.torque,
-        sigma=fit.sigma,
-        systematic=systematic,
-        interval_95=fit.torque[:, None] + fit.reach * np.outer(fit.sigma, [-1, 1]),
-        gyroscopic=course.gyroscopic,
+        torque_Nm=fit.torque,
+        torque_sigma_Nm=fit.sigma,
+        torque_systematic_Nm=systematic,
+        torque_ci95_Nm=fit.torque[:, None] + fit.reach * np.outer(fit.sigma, [-1, 1]),
+        gyroscopic_Nm=course.gyroscopic,
         turn_rad_s=course.turn,
         turn_from=course.turn_from,
-        momentum=s.momentum.mean(axis=0),
+        momentum_Nms=s.momentum.mean(axis=0),
         wheel_drift_rad_s2=_wheel_drift(subject) if course.method == "drift" else {},
         time_s=tlm.seconds(s.tai_ns),
-        gained=course.turned.apply(course.y) - fit.values[:3],
-        fitted=course.G @ fit.torque,
-        fitted_95=fit.reach * np.sqrt(np.maximum(gained_variance, 0.0)),
+        gained_Nms=course.turned.apply(course.y) - fit.values[:3],
+        fitted_Nms=course.G @ fit.torque,
+        fitted_ci95_Nms=fit.reach * np.sqrt(np.maximum(gained_variance, 0.0)),
         used=fit.used,
-        worth=fit.worth,
+        effective_samples=fit.worth,
         relative=subject.relative,
-        doubts=(*s.doubts, *course.doubts, *_quality(fit, course, systematic)),
+        doubts=Doubts([*s.doubts, *course.doubts, *_quality(fit, course, systematic)]),
         settings={inertia: subject.inertia_kgm2, "wheels": [w.name for w in subject.craft.wheels]},
     )
 
@@ -312,31 +366,20 @@ def _wheel_drift(subject: Subject) -> dict[str, float]:
     return {c.member: float(robust_line(tlm.seconds(c.tai_ns), c.values)[0][1]) for c in channels}
 
 
-def _quality(fit: Fit, course: _Course, systematic) -> list[str]:
+def _quality(fit: Fit, course: _Course, systematic) -> list[Doubt]:
     """Doubts that a fit itself raises."""
     doubts = []
     out = int((~fit.used).sum())
     if out > max(3, 0.01 * len(fit.used)):
-        doubts.append(
-            f"{out} of {len(fit.used)} samples stand {OUTLYING:.0f} sigma off the fit and do not count: is the inertia right?"
-        )
+        doubts.append(OUTLIERS(outliers=out, samples=len(fit.used), limit=OUTLYING))
     if fit.worth < _FEW_WORTH:
-        doubts.append(
-            f"residuals follow each other, and all samples are worth {fit.worth:.0f} independent ones: the torque is not constant, or the "
-            "inertia not right, and sigma is rough"
-        )
+        doubts.append(FEW_EFFECTIVE_SAMPLES(effective=fit.worth))
     elif fit.used.sum() >= 8 * FEWEST:
         rows, y, middle = course.rows, course.y, len(course.y) // 2
         first, second = regress(rows[:middle], y[:middle]), regress(rows[middle:], y[middle:])
         apart = np.abs(first.torque - second.torque) / np.hypot(first.sigma, second.sigma)
         if np.nanmax(apart) > _CHANGED:
-            doubts.append(
-                f"both halves of the span give torques {np.nanmax(apart):.1f} sigma apart (about {AXES[int(np.nanargmax(apart))]}): "
-                "it is not constant in these axes, or what is taken as known is off"
-            )
+            doubts.append(NOT_CONSTANT(apart=float(np.nanmax(apart)), axis=AXES[int(np.nanargmax(apart))]))
     if (systematic > fit.sigma).any():
-        doubts.append(
-            "what is taken as known (spin inertia to 0.24 %, inertia to 1 %, gyros, turn) may shift the torque by more than "
-            "its sigma, which holds noise only: see systematic"
-        )
+        doubts.append(SYSTEMATIC(spin_percent=100 * SPIN_SHARE, inertia_percent=100 * INERTIA_SHARE))
     return doubts

@@ -5,13 +5,17 @@ Their torques are the same, so momentum cannot tell them apart: only their count
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...craft.model import Thruster
 from ...kit.errors import some_of
-from ...telemetry.telemetry import Telemetry
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ...craft.model import Thruster
+    from ...telemetry.telemetry import Telemetry
 
 CHANNEL = "thruster_branch"
 

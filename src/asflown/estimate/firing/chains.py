@@ -8,13 +8,16 @@ which stays; firings of unknown time count early or late, which does not.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...dynamics.pulses import Valve, expected_effective
 from ...kit.banded import Covariance
-from .counters import Known
-from .firings import Firings
+
+if TYPE_CHECKING:
+    from .counters import Known
+    from .firings import Firings
 
 #: Quiet steps from which the samples' noise is taken; with fewer it is what the fit leaves.
 _QUIET = 12

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...craft.model import Craft, Thruster
 from ...kit.errors import BadInput, some_of
 from ...kit.timeline import NS
-from ...telemetry.telemetry import Channel, Telemetry
-from ..subject import Subject
 from .pulse_counts import Guess, guess_pulses
 from .pulse_lengths import Lengths, lengths_of, weak_because_lasting
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft, Thruster
+    from ...telemetry.telemetry import Channel, Telemetry
+    from ..subject import Subject
 
 #: After a pulse's order, what it gives is not all there for up to so long. [s]
 _TAIL_S = 0.5

@@ -8,19 +8,22 @@ the variance of so many pulses placed at random.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ...craft.model import Craft, Thruster
 from ...kit.errors import BadInput
 from ...kit.rotations import turned_by
 from ...kit.timeline import NS
-from ...telemetry.telemetry import Telemetry
 from ..subject import Samples, Subject, at_limit, samples_of, subject_of
 from .branches import CHANNEL, branch_change, branches_in_use, undescribed
 from .counters import Counters, Known, NothingFires, counters_of, step_of
 from .missed_pulses import PULSES, gained_idle, pulse_Nms, uncounted
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft, Thruster
+    from ...telemetry.telemetry import Telemetry
 
 #: Pulses a second times this is what a sample soon after some of them counts as not known. [s]
 _TAIL_S = 0.2

@@ -10,20 +10,23 @@ tells the surroundings' torque by itself, and so do pulses their own thrust: on 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...craft.model import Craft
 from ...kit.banded import Covariance
 from ...kit.errors import BadInput
 from ...kit.regression import noise_sigma
 from ...telemetry.channels import AXES
-from ...telemetry.telemetry import Telemetry
 from ..subject import INERTIA_SHARE, samples_of, subject_of, thrusters_firing
 from .chains import Chain, momentum_chain
 from .firings import Firings, firings_of
 from .priors import Priors, priors_for
 from .valve import valve_of
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ...telemetry.telemetry import Telemetry
 
 #: One sigma of the thrust that a craft's history gives for a date, as a share: assumed. [1]
 THRUST_SHARE = 0.2

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...craft.model import Craft, Thruster
 from ...dynamics.pulses import Valve, moment_matrix
 from ...kit.errors import BadInput
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ...craft.model import Craft, Thruster
 
 #: So many pulses' worth of momentum within one span in which no on-time rises are more than what pulses still owe.
 PULSES = 4.0

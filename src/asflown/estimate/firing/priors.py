@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...craft.model import Craft
 from ...kit.errors import BadInput
 from ..subject import GYRO_BIAS, INERTIA_SHARE, SPIN_SHARE
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
 
 #: 001 section V: tests gave fall times of 40 to 90 ms, 65 in the mean. [s]
 FALL, FALL_SIGMA = 0.065, 0.013

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from ...craft.model import Thruster
 from ...dynamics.pulses import Valve
+
+if TYPE_CHECKING:
+    from ...craft.model import Thruster
 
 
 def valve_of(thrusters: tuple[Thruster, ...], fall_s: float) -> Valve:

@@ -13,13 +13,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from ...kit.ensemble import respond
 from ...kit.smoother import Measurements, Model, Smoothed, discretize
-from .series import Times
+
+if TYPE_CHECKING:
+    from .series import Times
 
 
 @dataclass(frozen=True)

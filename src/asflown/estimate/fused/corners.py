@@ -17,16 +17,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from ...kit.ensemble import Gains, gains, paths, simulate, spread, whiten
-from ...kit.smoother import Measurements
 from .body import Body, Levels, Posterior, response
 from .corner_sampler import sample
 from .peaks import excursions, peak_scale
-from .series import Times
+
+if TYPE_CHECKING:
+    from ...kit.smoother import Measurements
+    from .series import Times
 
 #: Sizes of the roughness as shares of the torque's own size near that time, and time scales, short of what the telemetry
 #: resolves (studies/corners.py). [1], [s]

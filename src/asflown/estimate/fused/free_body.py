@@ -17,13 +17,15 @@ Measured are rate + error and either h (wheels) or u itself (control-moment gyro
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from ...kit.smoother import Measurements, Smoothed
 from .body import Body, Levels
 from .series import BODY_RATE, CONTROL_TORQUE, MOMENTUM, ROWS, Times, channel_of, step_of, usual_size, white_noise
+
+if TYPE_CHECKING:
+    from ...kit.smoother import Measurements, Smoothed
 
 _RATE, _STORED, _FREE, _FREE_SLOPE, _ANGLE, _HELD, _ERROR, _TORQUE, _STATES = 0, 1, 2, 3, 4, 5, 6, 7, 9
 

@@ -4,15 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...kit.errors import BadInput, some_of
 from ...kit.timeline import NS
 from ...telemetry.channels import AXES
-from ...telemetry.telemetry import Channel
-from ..subject import Grid, Subject, actuators, gap_doubts, gaps_on_grid, grid_for, slews, splined, thrusters_firing
+from ..subject import (
+    GAPS_BRIDGED,
+    Grid,
+    Subject,
+    actuators,
+    gap_doubts,
+    gaps_on_grid,
+    grid_for,
+    slews,
+    splined,
+    thrusters_firing,
+)
 from .series import ATTITUDE_ERROR, BODY_RATE, CONTROL_TORQUE, MOMENTUM, Series
+
+if TYPE_CHECKING:
+    from ...telemetry.telemetry import Channel
 
 LOOPS = ("modelled", "measured")
 
@@ -87,9 +101,7 @@ def gather(subject: Subject, axes: tuple[int, ...], loop: str | None, motion: Mo
     if not modelled:  # where wheels stick and tear loose, instants within the cadence begin to matter
         series = {j: [s.with_jumps() for s in of_axis] for j, of_axis in series.items()}
     silent = {g: c.name for c in everything for g in gaps_on_grid(c, grid)}
-    doubts += [
-        d.replace("are left null", "are bridged by the model, the band widened") for d in gap_doubts(tlm, grid, silent)
-    ]
+    doubts += gap_doubts(tlm, grid, silent, GAPS_BRIDGED)
     return Record(grid, "modelled" if modelled else "measured", bool(pushed), series, start, together, doubts)
 
 

@@ -13,14 +13,17 @@ the errors are (X' X)^-1 X' W y: the conditional of a Gaussian, read off its inv
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg
 
 from ...kit.ensemble import gains, whiten
-from .body import Body, Levels
 from .levels import fit_levels
 from .series import ROWS, Series, arrange, channel_of, step_of
+
+if TYPE_CHECKING:
+    from .body import Body, Levels
 
 #: Length of a block held back, and how many blocks apart those held back at the same time are. [s]
 BLOCK_S, APART = 60.0, 4

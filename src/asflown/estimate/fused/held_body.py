@@ -15,14 +15,16 @@ moves body and wheels oppositely, so total momentum never feels it.  Measured ar
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from ...craft.model import WheelController
-from ...kit.smoother import Measurements, Smoothed
 from .body import Body, Levels, response
 from .series import ATTITUDE_ERROR, BODY_RATE, MOMENTUM, ROWS, Times, channel_of, usual_size, white_noise
+
+if TYPE_CHECKING:
+    from ...craft.model import WheelController
+    from ...kit.smoother import Measurements, Smoothed
 
 _ATTITUDE, _RATE, _FILTER, _STORED, _ERROR, _TORQUE, _STATES = 0, 1, 2, 6, 7, 8, 10
 

@@ -9,13 +9,16 @@ the torque is smoothed without it, and d only widens the band.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...kit.ensemble import gains, paths, smoothed, whiten
 from ...kit.smoother import Measurements, smooth
 from .body import Body, Posterior
-from .series import Times
+
+if TYPE_CHECKING:
+    from .series import Times
 
 
 def gaussian_torque(

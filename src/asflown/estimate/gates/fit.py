@@ -9,17 +9,19 @@ additive with the tails of Student's t, so that single burns far out count littl
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...kit.errors import BadInput, some_of
-from ...maneuvers.model import Gates
-from ...maneuvers.table import Maneuvers
 from .intervals import bias_intervals, sigma_interval
 from .likelihood import NOWHERE, Problem
 from .result import GatesFit, ModelScore, Part
 from .robust import FREEDOM, RobustProblem
+
+if TYPE_CHECKING:
+    from ...maneuvers.model import Gates
+    from ...maneuvers.table import Maneuvers
 
 MODELS = ("estimated-bias", "zero-mean", "mean-aware")
 LIKELIHOODS = ("additive", "robust", "printed", "unweighted")

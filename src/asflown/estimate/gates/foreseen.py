@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import special
 
-from ...maneuvers.model import Gates
-from .likelihood import Point, Problem
+if TYPE_CHECKING:
+    from ...maneuvers.model import Gates
+    from .likelihood import Point, Problem
 
 
 @dataclass(frozen=True)

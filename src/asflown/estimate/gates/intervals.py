@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import optimize, stats
 
-from .likelihood import Point, Problem
+if TYPE_CHECKING:
+    from .likelihood import Point, Problem
 
 #: Sigmas are looked for up to this many times the scatter of the errors; beyond, an interval has no upper end.
 _FARTHEST = 30.0

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
 
-from ...maneuvers.history import PastModel
 from .checks import Directions, Spread, directions_of, spread_of
 from .fit import FEWEST
 from .foreseen import foresee, foresee_by
-from .result import GatesFit, Part
+
+if TYPE_CHECKING:
+    from ...maneuvers.history import PastModel
+    from .result import GatesFit, Part
 
 #: Adjusted p-value (Benjamini and Hochberg) up to which an outlier is one, and the papers' rule.
 _DISCOVERY, _SIGMAS = 0.05, 2.0

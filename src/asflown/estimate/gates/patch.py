@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
 
 from ...kit.errors import BadInput
-from ...maneuvers.table import Maneuvers
 from .checks import sign_test
 from .fit import problems
+
+if TYPE_CHECKING:
+    from ...maneuvers.table import Maneuvers
 
 #: Burns on either side that a comparison takes: two biases, and something to spare.
 _FEWEST = 4

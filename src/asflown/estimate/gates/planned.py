@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
 
 from ...maneuvers.history import PastModel
-from ...maneuvers.plan import Plan
 from .foreseen import foresee
-from .result import GatesFit
+
+if TYPE_CHECKING:
+    from ...maneuvers.plan import Plan
+    from .result import GatesFit
 
 _CONFIDENCE = 0.95
 

@@ -14,10 +14,13 @@ w = r sqrt(f - 1) / sqrt(1 - r^2), which is t-distributed with f - 1 degrees of 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy import optimize, special
 
-from .foreseen import Foreseen
+if TYPE_CHECKING:
+    from .foreseen import Foreseen
 
 #: The power that a detectable underburn is seen with.
 POWER = 0.8

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...kit.plain import finite
 from ...maneuvers.model import Gates
-from ...maneuvers.table import Maneuvers
-from .intervals import Interval
 from .likelihood import LOG_2PI, Point, Problem
+
+if TYPE_CHECKING:
+    from ...maneuvers.table import Maneuvers
+    from .intervals import Interval
 
 
 @dataclass(frozen=True)

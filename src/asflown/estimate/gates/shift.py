@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .foreseen import Foreseen
+if TYPE_CHECKING:
+    from .foreseen import Foreseen
 
 #: Sequences drawn for the p-value, and burns it takes.
 _DRAWS, _FEWEST = 4000, 3

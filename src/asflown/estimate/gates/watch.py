@@ -9,18 +9,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import optimize, stats
 
 from ...kit.errors import BadInput
-from ...maneuvers.history import PastModel
 from ...maneuvers.model import Gates
-from ...maneuvers.table import Maneuvers
 from .fit import problems
 from .foreseen import Foreseen, foresee, foresee_by
 from .power import detectable
 from .shift import Shift, find_shift
+
+if TYPE_CHECKING:
+    from ...maneuvers.history import PastModel
+    from ...maneuvers.table import Maneuvers
 
 #: Burns before the first that is watched, unless a model is given.
 FEWEST_BEFORE = 15

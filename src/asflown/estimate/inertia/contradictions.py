@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations, pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import ndimage
@@ -16,8 +16,12 @@ from ...kit.rotations import rotation
 from ...telemetry.attitude import MISTAKEN_UNITS
 from .motion import Layout, first_motion
 from .plain import plain_fit
-from .record import SlewRecord
-from .slews import Slew
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from .record import SlewRecord
+    from .slews import Slew
 
 #: Momentum left over, as a share of what the wheels' varies by, from which mistakes are looked for.
 _TOO_MUCH = 0.02

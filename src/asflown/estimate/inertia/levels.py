@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...kit.regression import third_difference_sigma
 from ...kit.rotations import rotation
-from .record import SlewRecord
+
+if TYPE_CHECKING:
+    from .record import SlewRecord
 
 
 def first_levels(record: SlewRecord) -> Levels:

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import factorial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -25,8 +26,10 @@ from ...dynamics.momentum import grown_by
 from ...dynamics.rigid_body import momentum_regressor, tensor_of
 from ...kit.regressed import Steps
 from ...kit.rotations import quaternion, rates_between, rotation, turned_by
-from .levels import Levels
-from .record import SlewRecord
+
+if TYPE_CHECKING:
+    from .levels import Levels
+    from .record import SlewRecord
 
 #: Instants closer than this are one. [s]
 _SAME_S = 1e-6

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...dynamics.rigid_body import momentum_regressor
 from ...kit.rotations import rotation
 from .motion import Layout, first_motion
-from .record import SlewRecord
+
+if TYPE_CHECKING:
+    from .record import SlewRecord
 
 
 def plain_fit(

@@ -12,21 +12,24 @@ axes and units), starting from a prior of 001's requirement, 10 % on moments and
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ...craft.model import Craft, CraftAt
 from ...dynamics.rigid_body import ELEMENTS
 from ...kit.errors import BadInput
 from ...kit.regression import noise_sigma
 from ...kit.timeline import NS, cadence_ns, seconds_since
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
-from ...telemetry.telemetry import Channel, Telemetry
 from ..subject import subject_of
 from .excitation import excitation, named, normal_matrix
 from .prior import prior_sigma
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft, CraftAt
+    from ...telemetry.telemetry import Channel, Telemetry
 
 #: Nominal noise of a sample of body and wheel rate. [rad/s]
 RATE_SIGMA, WHEEL_SIGMA = 2e-6, 0.005

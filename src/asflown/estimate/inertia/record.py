@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,8 +16,10 @@ from ...kit.timeline import NS
 from ...telemetry.attitude import rate_scale, together
 from ...telemetry.channels import AXES
 from ...telemetry.telemetry import Channel, Telemetry
-from ..subject import Subject
 from .slews import find_slews
+
+if TYPE_CHECKING:
+    from ..subject import Subject
 
 #: Samples of a faster channel are averaged in blocks of this length, far shorter than a slew's ramps; ... [s]
 BLOCK_S = 1.0

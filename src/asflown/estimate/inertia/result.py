@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...dynamics.rigid_body import ELEMENTS, elements_of
 from ...kit.digits import plus_minus
-from .excitation import Excitation
-from .prediction import InertiaComparison
-from .slews import Slew
+
+if TYPE_CHECKING:
+    from .excitation import Excitation
+    from .prediction import InertiaComparison
+    from .slews import Slew
 
 _ORDER = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
 

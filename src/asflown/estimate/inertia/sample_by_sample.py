@@ -7,6 +7,7 @@ axes, less what the wheels hold now is the body's own:  Q = R^T R(0) h(0) - h = 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,10 +15,12 @@ from ...dynamics.momentum import grown_by
 from ...dynamics.rigid_body import elements_of, momentum_regressor, tensor_of
 from ...kit.errors import BadInput
 from ...kit.rotations import rotation
-from .levels import Levels
 from .motion import Motion, first_motion
-from .record import SlewRecord
-from .slews import Slew
+
+if TYPE_CHECKING:
+    from .levels import Levels
+    from .record import SlewRecord
+    from .slews import Slew
 
 #: Readings before a slew whose mean is its first momentum, and after it that still belong to it: one, as in the paper.
 _BEFORE = 1

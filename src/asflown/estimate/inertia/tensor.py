@@ -12,14 +12,13 @@ mass lies does not matter: momentum is conserved about it wherever it is, and th
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...craft.model import Craft
 from ...dynamics.rigid_body import ELEMENTS, elements_of, momentum_regressor, nearest_possible, tensor_of
 from ...kit.errors import BadInput
 from ...kit.rotations import rates_between, rotation
-from ...telemetry.telemetry import Telemetry
 from ..subject import Subject, subject_of
 from .contradictions import MOST_STEPS, conserved
 from .excitation import Excitation, excitation
@@ -33,6 +32,10 @@ from .result import Evidence, InertiaResult
 from .sample_by_sample import all_axes, by_axis, generalized, rows_of
 from .slews import Slew, find_slews
 from .whole_motion import SlewFit, fit_slews, momentum_step
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ...telemetry.telemetry import Telemetry
 
 METHODS = ("consistent", "gls", "all", "axis")
 

@@ -8,6 +8,7 @@ the corner of a ramp does not stiffen or loosen the rest.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import optimize
@@ -18,7 +19,9 @@ from ...kit.rotations import rates_between
 from .levels import Levels, first_levels
 from .motion import WHEEL, Layout, Linearized, Motion, first_motion, instants, linearized
 from .plain import _shifted, plain_fit
-from .record import SlewRecord
+
+if TYPE_CHECKING:
+    from .record import SlewRecord
 
 #: Degrees of freedom of the acceleration's steps: tails for corners of ramps, and not so heavy that every step fits its own noise.
 _FREEDOM = 5.0

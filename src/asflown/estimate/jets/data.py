@@ -10,20 +10,23 @@ the filter whitens them all; neither lag nor smoothing enters, but gains and fil
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from ...craft.model import Craft
-from ...dynamics.flyby import Flyby
 from ...dynamics.plume import FARTHEST_M, Jet, seen_from
 from ...kit.errors import BadInput
 from ...kit.regression import noise_sigma
 from ...telemetry.channels import AXES
-from ...telemetry.telemetry import Telemetry
-from ..density import DensityResult
 from ..fused import hats, regression
 from ..subject import samples_of, subject_of
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ...dynamics.flyby import Flyby
+    from ...telemetry.telemetry import Telemetry
+    from ..density import DensityResult
 
 _STEP_S = 0.25  # between nodes: a jet's cusp is seen
 _BEFORE_S = 120.0  # of quiet before closest approach, to know the momentum that craft and wheels had

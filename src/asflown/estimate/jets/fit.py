@@ -14,22 +14,25 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import f as fisher
 
-from ...craft.model import Craft
 from ...dynamics.flyby import Flyby, flyby_called
 from ...dynamics.plume import Jet, jet_density, model_error, plume_density, sources_passed
 from ...kit.errors import BadInput, some_of
 from ...kit.regression import memory
-from ...telemetry.telemetry import Telemetry
 from ..density import density
 from ..subject import check_on_times, slews, thrusters_firing
 from .data import JetData, by_momentum, through_loop
 from .printed import simplex
 from .result import JetsResult, Score, Source
 from .surface import WIDTHS_RAD, Surface
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ...telemetry.telemetry import Telemetry
 
 WIDTHS, FITS = ("own", "common"), ("momentum", "forward", "printed")
 #: Combinations of widths grow as 44 to the power of the sources; densities not negative as 2 to it.

@@ -6,14 +6,18 @@ little some parameters mean.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import minimize
 
 from ...dynamics.plume import Jet, model_error, plume_density
-from ..density import DensityResult
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..density import DensityResult
 
 STARTS, _SEED = 12, 2010
 #: Ends whose misfit is within this share of the best count as equal.

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...dynamics.plume import Jet, plume_density
-from ..density import DensityResult
+
+if TYPE_CHECKING:
+    from ..density import DensityResult
 
 #: What the samples of a fit are.
 _OF = {

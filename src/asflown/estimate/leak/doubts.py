@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.optimize import nnls
 
-from ...craft.model import Craft
 from ...kit.errors import some_of
 from ...kit.timeline import NS, utc_label
-from ...telemetry.telemetry import Telemetry
 from ..firing import PULSES, branch_change, undescribed
-from .firing import Geometry
-from .noise import Noise
 from .residual import AXES_IN_A_LEAK, Steps
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ...telemetry.telemetry import Telemetry
+    from .firing import Geometry
+    from .noise import Noise
 
 #: Log likelihood ratio of any direction over the best column; noise exceeds it once in 1100.
 MISFIT = 7.0

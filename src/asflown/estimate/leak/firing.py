@@ -8,15 +8,18 @@ and its tail) is noise of that instant.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...craft.model import Craft
 from ...dynamics.pulses import Valve, moment_matrix
 from ...kit.errors import BadInput, some_of
 from ...kit.timeline import NS
 from ...telemetry.attitude import together
-from ...telemetry.telemetry import Telemetry
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ...telemetry.telemetry import Telemetry
 
 #: Shortest pulse where the craft's control period is not known. [s]
 _SHORTEST_PULSE = 0.125

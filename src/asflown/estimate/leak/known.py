@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING
 
-from ...craft.model import Craft
 from ...kit.errors import BadInput
 from ..firing import CENTER_SIGMA
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
 
 _HOUR_S = 3600.0
 

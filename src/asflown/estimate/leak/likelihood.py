@@ -14,16 +14,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq
 from scipy.special import log_ndtr
 
 from ...kit.errors import BadInput
-from .firing import Geometry
-from .known import Known
-from .noise import Noise
 from .residual import AXES_IN_A_LEAK, Steps
+
+if TYPE_CHECKING:
+    from .firing import Geometry
+    from .known import Known
+    from .noise import Noise
 
 #: Times at which a change may have begun are kept this many to an octave of age, and half as many again.
 _PER_OCTAVE = 8

@@ -7,13 +7,15 @@ leak; which thruster leaks is read off the signs of its three parts.  The papers
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import norm
 
-from .firing import Geometry
-from .noise import Noise
-from .residual import Steps
+if TYPE_CHECKING:
+    from .firing import Geometry
+    from .noise import Noise
+    from .residual import Steps
 
 #: A part smaller than this share of the largest counts as none: a Z thruster turns nothing about z, noise a little.
 _NONE = 1 / 3

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from ...kit.digits import plus_minus
 from ...kit.errors import some_of
-from .papers_monitor import ErrorMonitor
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from .papers_monitor import ErrorMonitor
 
 
 @dataclass(frozen=True)

@@ -10,15 +10,13 @@ A ``LeakWatch`` takes telemetry as it grows and gives in pieces what one look at
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.stats import norm
 
-from ...craft.model import Craft
 from ...kit.errors import BadInput, some_of
 from ...kit.timeline import NS
-from ...telemetry.telemetry import Telemetry
 from ..firing import PULSES, center_doubts, gained_idle, other_branch, pulse_Nms, uncounted
 from ..subject import Subject, stopped, subject_of
 from .doubts import branch_doubts, loss_doubt, noise_doubts, pointing_doubt, thrust_doubts, together
@@ -29,6 +27,10 @@ from .noise import Noise, learned_noise
 from .papers_monitor import ErrorMonitor, error_monitor, threshold_at_rate
 from .residual import Steps, steps_of
 from .result import LeakResult
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ...telemetry.telemetry import Telemetry
 
 METHODS = ("likelihood", "threshold")
 

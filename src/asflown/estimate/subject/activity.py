@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy import ndimage
 
-from ...craft.model import Craft
 from ...kit.errors import BadInput
 from ...telemetry.channels import AXES
-from ...telemetry.telemetry import Telemetry
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ...telemetry.telemetry import Telemetry
 
 #: A body rate that changes by more than this is that of a slew. [rad/s]
 _SWING_OF_A_SLEW = 2e-4

@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+from ...kit.doubts import Kind, Severity
 from ...kit.errors import BadInput
 from ...telemetry.channels import AXES
-from .subject import Subject
+
+if TYPE_CHECKING:
+    from .subject import Subject
+
+
+COMMANDED_ONLY = Kind(
+    "subject.commanded-only", Severity.CAUTION,
+    "only the commanded control torque is telemetered: it is assumed to be delivered, and momentum_Nms is that of the body "
+    "alone, without what the actuators hold", "Add wheel_rate_<WHEEL> or wheel_momentum_x|y|z.",
+)  # fmt: skip
 
 
 def actuators(subject: Subject):
@@ -19,11 +31,7 @@ def actuators(subject: Subject):
     if tlm.has_axes("wheel_momentum"):
         return [(tlm.channel(f"wheel_momentum_{a}"), np.eye(3)[j]) for j, a in enumerate(AXES)], [], []
     if tlm.has_axes("control_torque"):
-        doubt = (
-            "only the commanded control torque is telemetered: it is taken as delivered, and momentum_Nms is the body's alone, "
-            "without what the actuators hold"
-        )
-        return [], [tlm.channel(f"control_torque_{a}") for a in AXES], [doubt]
+        return [], [tlm.channel(f"control_torque_{a}") for a in AXES], [COMMANDED_ONLY()]
     subject.wheels()  # names what is missing
     raise BadInput(
         "neither wheel rates, wheel momentum nor control torque are in the telemetry",

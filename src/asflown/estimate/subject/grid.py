@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from ...kit.doubts import Doubt, Kind, Severity
 from ...kit.errors import BadInput, some_of
 from ...kit.regression import LocalFit, local_polynomial, noise_sigma
 from ...kit.timeline import NS, seconds_since
-from ...telemetry.telemetry import Channel, Telemetry
+
+if TYPE_CHECKING:
+    from ...telemetry.telemetry import Channel, Telemetry
 
 #: Instants in one estimate: five weeks at 1 s, some gigabytes of memory.
 _MOST_INSTANTS = 3_000_000
@@ -175,8 +179,22 @@ def splined(channel: Channel, grid: Grid) -> np.ndarray:
     return out
 
 
-def gap_doubts(tlm: Telemetry, grid: Grid, silent: dict[tuple[float, float], str]) -> list[str]:
-    """One sentence for the stretches at which a result is null."""
+GAPS_NULL = Kind(
+    "subject.gaps-null",
+    Severity.NOTE,
+    "gaps longer than five samples are left null: {spans}",
+    "Use --method fused, which bridges them.",
+)
+GAPS_BRIDGED = Kind(
+    "subject.gaps-bridged", Severity.NOTE,
+    "gaps longer than five samples are bridged by the model, with a wider band: {spans}",
+)  # fmt: skip
+
+
+def gap_doubts(
+    tlm: Telemetry, grid: Grid, silent: dict[tuple[float, float], str], kind: Kind = GAPS_NULL
+) -> list[Doubt]:
+    """One doubt of a ``kind`` for the gaps, from the grid's start [s] with the channel that is silent."""
     inside = {g: name for g, name in silent.items() if g[1] > 0 and g[0] < grid.seconds[-1]}
     if not inside:
         return []
@@ -184,4 +202,4 @@ def gap_doubts(tlm: Telemetry, grid: Grid, silent: dict[tuple[float, float], str
     first = sorted(inside)[:3]
     spans = ", ".join(f"{zero + a:.0f}-{zero + b:.0f} s ({inside[(a, b)]})" for a, b in first)
     more = f" and {len(inside) - 3} more" if len(inside) > 3 else ""
-    return [f"gaps longer than five samples are left null: {spans}{more}"]
+    return [kind(spans=f"{spans}{more}", count=len(inside))]

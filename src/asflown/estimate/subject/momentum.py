@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
+from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput
 from ...kit.rotations import rotation
 from ...kit.timeline import NS, cadence_ns
@@ -15,7 +17,9 @@ from ...telemetry.channels import AXES
 from ...telemetry.telemetry import BRIDGED, Channel, Telemetry
 from .actuation import actuators
 from .grid import grid_for, splined
-from .subject import Subject
+
+if TYPE_CHECKING:
+    from .subject import Subject
 
 
 @dataclass(frozen=True)
@@ -28,7 +32,7 @@ class Samples:
     body: np.ndarray
     rates: np.ndarray | None
     attitude: Rotation | None
-    doubts: list[str]
+    doubts: Doubts
     splined_s: float = 0.0  # the coarsest cadence, where channels had to be splined to common instants
 
     @property
@@ -43,6 +47,28 @@ class Samples:
     @property
     def momentum(self) -> np.ndarray:
         return self.stored + self.body
+
+
+#: Instants that a fit takes at least.
+FEWEST = 8
+
+SPLINED = Kind(
+    "subject.splined", Severity.NOTE, "the channels are sampled at different instants: they are splined to common ones"
+)
+QUATERNION_IN_PARTS = Kind(
+    "subject.quaternion-in-parts", Severity.CAUTION,
+    "the components of the quaternion are never known at the same instant: it is not used",
+)  # fmt: skip
+BODY_LEFT_OUT = Kind(
+    "subject.body-left-out",
+    Severity.CAUTION,
+    "{why}: the body's own momentum is left out",
+    "Add body_rate_x, _y, _z, or --inertia.",
+)
+GAPS_IN_MOMENTUM = Kind(
+    "subject.gaps-in-momentum", Severity.NOTE,
+    "{count} gaps, {total_s:.0f} s in all, the longest at {start}: the torque is assumed to be the same in them",
+)  # fmt: skip
 
 
 def samples_of(subject: Subject) -> Samples:
@@ -63,11 +89,11 @@ def samples_of(subject: Subject) -> Samples:
     if len(tai_ns) > 0.5 * len(stored[0][0].usable.tai_ns):
         attitude = rotation(values[:, len(channels) :]) if quaternion else None
     else:
-        doubts = [*doubts, "the channels are sampled at different instants: they are splined to common ones"]
+        doubts = [*doubts, SPLINED()]
         tai_ns, values, attitude = _splined(channels, together(tlm, quaternion) if quaternion else None)
         splined_s = max(c.usable.cadence_ns for c in channels) / NS
         if quaternion and attitude is None:
-            doubts.append("the parts of the quaternion are never known together: it is not used")
+            doubts.append(QUATERNION_IN_PARTS())
     if len(tai_ns) < FEWEST:
         raise BadInput(
             f"{len(tai_ns)} instants at which all channels are known are too few",
@@ -80,8 +106,8 @@ def samples_of(subject: Subject) -> Samples:
         body = w @ I_B
     else:
         missing = "body rates are not in the telemetry" if w is None else "the craft's inertia is not known"
-        doubts = [*doubts, f"{missing}: the body's own momentum is left out"]
-    return Samples(tai_ns, each, body, w, attitude, [*doubts, *_gaps(tlm, tai_ns)], splined_s)
+        doubts = [*doubts, BODY_LEFT_OUT(why=missing)]
+    return Samples(tai_ns, each, body, w, attitude, Doubts([*doubts, *_gaps(tlm, tai_ns)]), splined_s)
 
 
 def _splined(channels: list[Channel], quaternion):
@@ -100,17 +126,14 @@ def _splined(channels: list[Channel], quaternion):
     return tai_ns[known], values[known], attitude
 
 
-def _gaps(tlm: Telemetry, tai_ns: np.ndarray) -> list[str]:
+def _gaps(tlm: Telemetry, tai_ns: np.ndarray) -> list[Doubt]:
     step = np.diff(tai_ns)
     long = np.flatnonzero(step > (BRIDGED + 1.5) * cadence_ns(tai_ns))
     if not len(long):
         return []
     worst = long[int(np.argmax(step[long]))]
     return [
-        f"{len(long)} gaps, {step[long].sum() / NS:.0f} s in all, the longest at {tlm.describe_time(int(tai_ns[worst]))}: "
-        "in them the torque is taken to be the same"
+        GAPS_IN_MOMENTUM(
+            count=len(long), total_s=float(step[long].sum() / NS), start=tlm.describe_time(int(tai_ns[worst]))
+        )
     ]
-
-
-#: Instants that a fit takes at least.
-FEWEST = 8

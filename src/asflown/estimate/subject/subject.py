@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...craft.model import Craft, CraftAt, Wheel
+from ...kit.doubts import Doubts, Kind, Severity
 from ...kit.errors import BadInput, some_of
 from ...kit.timeline import utc_label
-from ...telemetry.telemetry import Channel, Telemetry
+from .activity import slews, thrusters_firing
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft, CraftAt, Wheel
+    from ...telemetry.telemetry import Channel, Telemetry
 
 #: A mechanism counts as moving when its angle changes by more than this. [rad]
 _MOVED = 0.05
@@ -23,11 +29,21 @@ class Subject:
     craft: CraftAt
     inertia_kgm2: np.ndarray | None  # (3, 3); without a moving mechanism; per unit spin inertia if relative
     moving: str | None
-    doubts: tuple[str, ...]
+    doubts: Doubts
 
     @property
     def relative(self) -> bool:
         return any(w.spin_inertia is None for w in self.craft.wheels)
+
+    @cached_property
+    def slewing(self) -> bool:
+        """Whether the craft slews in this record."""
+        return slews(self.telemetry)
+
+    @cached_property
+    def firing(self) -> list[str]:
+        """Thrusters that fire in this record."""
+        return thrusters_firing(self.telemetry)
 
     def known_inertia(self) -> np.ndarray:
         """Raises BadInput where the craft's inertia is not known."""
@@ -72,6 +88,23 @@ class Subject:
         return [(tlm.channel(f"wheel_rate_{w.name}"), w) for w in self.craft.wheels]
 
 
+UNDATED = Kind(
+    "subject.undated", Severity.CAUTION,
+    "the telemetry has no epoch: the craft's latest known mass properties and wheel set are used",
+    "Put '# epoch: 2015-09-29T00:00:00 UTC' at the head of the file.",
+)  # fmt: skip
+NOT_IN_SERVICE = Kind(
+    "subject.wheel-not-in-service",
+    Severity.NOTE,
+    "wheel {wheel} was not in service then ({date}): its rate is not used",
+)
+PER_SPIN_INERTIA = Kind(
+    "subject.per-spin-inertia", Severity.NOTE,
+    "the wheels' spin inertia is not known: {what} per unit spin inertia (rad/s^2, rad/s), not in N m",
+    "Give the wheels' spin_inertia in the craft file.",
+)  # fmt: skip
+
+
 def subject_of(telemetry: Telemetry, craft: Craft, moving: str | None = "auto") -> Subject:
     """The craft on the telemetry's date.
 
@@ -79,17 +112,17 @@ def subject_of(telemetry: Telemetry, craft: Craft, moving: str | None = "auto") 
     one whose angle is seen to move.  An inertia given by the user is used as given."""
     now = craft.at(telemetry.date_ns)
     given = any(m.piece == "given" for m in craft.mass_properties)
-    doubts = list(telemetry.doubts) + [d for d in now.doubts]
+    doubts = [*telemetry.doubts, *now.doubts]
     if not telemetry.dated and not given and len(craft.mass_properties) > 1:
-        doubts.append("the telemetry has no epoch: the craft's latest known mass properties and wheel set are used")
+        doubts.append(UNDATED())
     for name in telemetry.members("wheel_rate"):
         if name in craft.wheel_names and now.wheel(name) is None:
-            doubts.append(f"wheel {name} was not in service then ({_when(telemetry)}): its rate is not used")
+            doubts.append(NOT_IN_SERVICE(wheel=name, date=_when(telemetry)))
     part = None if given else (_moved(telemetry, craft) if moving == "auto" else moving)
     I_B = now.inertia_kgm2
     if part is not None and I_B is not None:
         I_B = now.effective_inertia(part)
-    return Subject(telemetry, now, I_B, part, tuple(dict.fromkeys(doubts)))
+    return Subject(telemetry, now, I_B, part, Doubts(doubts))
 
 
 def _when(telemetry: Telemetry) -> str:

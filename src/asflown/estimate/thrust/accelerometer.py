@@ -7,14 +7,17 @@ known to much better than a count.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...craft.model import Accelerometer, Craft, Thruster
 from ...kit.errors import BadInput
 from ...kit.timeline import NS
-from ...telemetry.telemetry import Telemetry
 from ..firing import Chain, Counters, Nuisance
+
+if TYPE_CHECKING:
+    from ...craft.model import Accelerometer, Craft, Thruster
+    from ...telemetry.telemetry import Telemetry
 
 CHANNEL = "accelerometer_count"
 #: A burn is where its thrusters are on for more than this share of the most they are.

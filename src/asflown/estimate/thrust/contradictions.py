@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...craft.model import Craft
 from ...dynamics.pulses import moment_matrix
 from ...kit.errors import BadInput
 from ...kit.timeline import runs
 from ..firing import PULSES, Firings, Priors, gained_idle, pulse_Nms, uncounted
 from .printed import balance
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
 
 #: Share of the momentum gained that one thrust for all leaves unexplained: above it names, places or units are wrong; and to
 #: which share of that an exchange of names must bring it to be told.

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from ...craft.model import Craft
 from ...dynamics.pulses import Valve, expected_effective
 from ...kit.timeline import utc_label
 from ...telemetry.telemetry import Telemetry, file_name
-from ..firing import Counters, Firings
 from .result import EventSeen
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ..firing import Counters, Firings
 
 
 def pulse_ratios(counters: list[Counters], which, step_s: float, valve: Valve) -> dict[str, float]:

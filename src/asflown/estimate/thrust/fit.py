@@ -9,12 +9,14 @@ over, with the weight that the records give each value.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import chi2
 
-from ...dynamics.pulses import Valve
-from ..firing import Chain, Priors
+if TYPE_CHECKING:
+    from ...dynamics.pulses import Valve
+    from ..firing import Chain, Priors
 
 #: How unlike thrusters may be, as a share, at which the sum is taken.
 _UNLIKE = np.geomspace(0.002, 0.3, 11)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from ...craft.model import Craft
 from ...kit.errors import BadInput, some_of
-from ...telemetry.telemetry import Telemetry
 from ..firing import Firings, Priors, firings_of, momentum_chain, valve_of
 from ..subject import stopped
 from .accelerometer import CHANNEL, velocity_chain
@@ -14,6 +14,10 @@ from .contradictions import check_counted, check_names
 from .evidence import common_of, doubts_of, event_seen
 from .fit import Fit, fit_thrust
 from .result import ThrustResult
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ...telemetry.telemetry import Telemetry
 
 
 def joint(telemetry: list[Telemetry], craft: Craft, _: str, priors: Priors) -> ThrustResult:

@@ -7,12 +7,11 @@ F = M dV / sum of on-times, divided by R (Appendix D).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...craft.model import Craft
 from ...dynamics.pulses import VARIANTS
 from ...kit.errors import BadInput, some_of
 from ...kit.timeline import NS, utc_label
@@ -20,7 +19,12 @@ from ...telemetry.telemetry import Telemetry
 from ..firing import Priors, priors_for
 from .joint import joint
 from .papers import accelerometer_result, printed_result
-from .result import ThrustResult
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ...craft.model import Craft
+    from .result import ThrustResult
 
 METHODS = ("joint", "printed", "accelerometer")
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...craft.model import Craft
 from ...dynamics.pulses import expected_effective
 from ...kit.errors import BadInput
-from ...telemetry.telemetry import Telemetry
 from ..firing import Priors, counters_of, firings_of, step_of, valve_of
 from ..subject import subject_of
 from .accelerometer import along_of, burn_of
@@ -17,6 +16,10 @@ from .contradictions import check_counted, check_names
 from .evidence import common_of, doubts_of, event_seen
 from .printed import printed_thrust
 from .result import ThrustResult
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ...telemetry.telemetry import Telemetry
 
 
 def printed_result(telemetry: list[Telemetry], craft: Craft, variant: str, priors: Priors) -> ThrustResult:

@@ -11,12 +11,15 @@ and Z rows are printed corruptly; all of Q is taken).  Pulses are rectangles her
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from ...dynamics.pulses import moment_matrix
-from ..firing import Firings
+
+if TYPE_CHECKING:
+    from ..firing import Firings
 
 #: Singular values below this share of the largest are none.
 _NONE = 1e-6

@@ -7,17 +7,20 @@ there, is that for which the record is likeliest.  Thrust and fall time are solv
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from ...craft.model import Craft
 from ...kit.errors import BadInput
 from ...telemetry.channels import AXES
-from ...telemetry.telemetry import Telemetry
 from ..firing import THRUST_SHARE, Gained, gained
 from ..subject import thrusters_firing
 from .result import TorqueResult
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ...telemetry.telemetry import Telemetry
 
 _FEWEST, _LONGEST = 20, 2000  # steps, knots
 _DRAWS = 300

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...craft.model import Craft
 from ...kit.errors import BadInput, some_of
 from ...telemetry.channels import AXES
-from ...telemetry.telemetry import Telemetry
 from ..fused import CONSIDERED, LOOPS, PRIORS, fused
 from ..subject import Subject, subject_of, thrusters_firing
 from . import momentum, polynomial, transfer
 from .consistency import consistency
 from .result import TorqueResult, find_peaks
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ...telemetry.telemetry import Telemetry
 
 METHODS = ("fused", "momentum", "transfer", "polynomial")
 VARIANTS = ("corrected", "printed")

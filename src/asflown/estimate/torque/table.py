@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ...kit.files import write_text
 from ...telemetry.channels import AXES
-from .result import TorqueResult
+
+if TYPE_CHECKING:
+    from .result import TorqueResult
 
 
 def save_csv(result: TorqueResult, path, provenance: dict) -> None:

@@ -14,11 +14,11 @@ twice (eqs 18, 19), low-order inverse.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from ...craft.model import WheelController
 from ...dynamics.loop import SecondOrder, filtered_rate, hankel_order_two, low_order
 from ...kit.errors import BadInput, some_of
 from ...kit.regression import LocalFit, local_polynomial
@@ -26,6 +26,9 @@ from ...kit.timeline import NS, runs
 from ...telemetry.channels import AXES
 from ..subject import Grid, Subject, fit_on_grid, gap_doubts, gaps_on_grid, grid_for, splined
 from .momentum import HALF_WIDTH_S, smoothed_as_printed
+
+if TYPE_CHECKING:
+    from ...craft.model import WheelController
 
 MODELS = ("low", "hankel", "full")
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...kit.digits import plus_minus
-from .run_downs import RunDown
-from .use import WheelUse
+
+if TYPE_CHECKING:
+    from .run_downs import RunDown
+    from .use import WheelUse
 
 RUN_DOWN, FLIGHT_SOFTWARE, COMMAND = "run-down", "flight software estimate", "command"
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -19,7 +20,9 @@ from scipy.stats import chi2
 
 from ...kit.timeline import runs
 from ...telemetry.screening import quantisation_step
-from ...telemetry.telemetry import Channel
+
+if TYPE_CHECKING:
+    from ...telemetry.telemetry import Channel
 
 #: Below it the drag law has a third part, stiction, and samples are left out: 20 rpm. [rad/s]
 STICTION_RATE = 2.0

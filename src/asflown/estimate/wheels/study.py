@@ -7,21 +7,25 @@ makes up for whatever the drag is, so that the rates follow the torque on the bo
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...craft.model import Craft, Wheel
 from ...kit.errors import BadInput, some_of
 from ...kit.regression import robust_line
 from ...telemetry import attitude
 from ...telemetry.channels import AXES
-from ...telemetry.telemetry import Channel, Telemetry
 from .result import COMMAND, FLIGHT_SOFTWARE, RUN_DOWN, DragFit, DragSamples, Spike, WheelDrag, WheelsResult
 from .run_downs import FEWEST, STICTION_RATE, Coasting, Finder, together
 from .samples import find_spikes, opposing
 from .use import WheelUse, wheel_use
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from ...craft.model import Craft, Wheel
+    from ...telemetry.telemetry import Channel, Telemetry
 
 #: 300 rpm.  Below some speed a bearing's oil film is too thin to part the balls from the race; none of the papers
 #: gives it, so this is an assumption. [rad/s]

@@ -7,11 +7,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...telemetry.telemetry import Channel
 from .run_downs import own_noise
+
+if TYPE_CHECKING:
+    from ...telemetry.telemetry import Channel
 
 
 @dataclass(frozen=True)

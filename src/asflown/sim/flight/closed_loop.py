@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from ...craft.model import Craft, CraftAt
 from ...kit.errors import BadInput, some_of
 from ...kit.rotations import rotation
 from ...telemetry.channels import AXES
-from ...telemetry.telemetry import Telemetry
 from ..scenario import Scenario, load_scenario
 from .command import commanded_motion
 from .controllers import wheel_loop
@@ -32,6 +32,9 @@ from .thrusters import (
     thrusters_of,
 )
 from .write import write_flight
+
+if TYPE_CHECKING:
+    from ...telemetry.telemetry import Telemetry
 
 __all__ = ["Flight", "Truth", "fly", "write_flight"]
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ...kit.errors import BadInput
-from ..scenario import Slew
+
+if TYPE_CHECKING:
+    from ..scenario import Slew
 
 
 def slew_time(slew: Slew) -> float:

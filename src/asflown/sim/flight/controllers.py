@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.signal import cont2discrete
 
 from ...craft.model import CraftAt, tensor
 from ...kit.errors import BadInput
-from ..scenario import Scenario
 from .plant import Loop
+
+if TYPE_CHECKING:
+    from ..scenario import Scenario
 
 
 def rate_filter(natural_rad_s: float, damping: float, period_s: float, rule: str):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -10,7 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from ...craft.model import CraftAt, check_inertia, tensor
 from ...kit.errors import BadInput
-from ..scenario import CoverMotion
+
+if TYPE_CHECKING:
+    from ..scenario import CoverMotion
 
 #: The motor warms towards its end temperature with this time constant. Assumed. [s]
 WARMING_TIME_S = 120.0

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from ...craft.model import CraftAt, Pendulum
 from ...kit.errors import BadInput
-from ..scenario import Scenario
+
+if TYPE_CHECKING:
+    from ...craft.model import CraftAt, Pendulum
+    from ..scenario import Scenario
 
 
 def swinging(scenario: Scenario, now: CraftAt) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

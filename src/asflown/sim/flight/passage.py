@@ -7,17 +7,19 @@ formulas and figures; gravity gradient and everything that moves are the simulat
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...craft.model import CraftAt
 from ...dynamics.drag import torque_per_density
 from ...dynamics.flyby import Flyby, flyby_called
 from ...dynamics.plume import as_passed, plume_density, published_jets
 from ...kit.errors import BadInput, some_of
 from ...telemetry.channels import AXES
-from ..scenario import Passage, Plume
+
+if TYPE_CHECKING:
+    from ...craft.model import CraftAt
+    from ..scenario import Passage, Plume
 
 #: One Runge-Kutta step: the curve, not its chords. [s]
 _STEP_S = 0.03125

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ...kit.errors import BadInput
 from ...kit.timeline import NS
 from ...telemetry.channels import kind_of, member_of
 from ...telemetry.telemetry import Channel, Telemetry
-from ..scenario import Scenario
 from .sensors import stream
+
+if TYPE_CHECKING:
+    from ..scenario import Scenario
 
 
 def telemetry_of(

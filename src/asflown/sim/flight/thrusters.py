@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...craft.model import Craft, CraftAt
 from ...kit.errors import BadInput, some_of
 from ...kit.rotations import rotation
 from ...kit.timeline import NS, utc_label
@@ -15,6 +15,9 @@ from ..scenario import CatalystBeds, Scenario, ThrusterUse
 from .plant import Thrusters
 from .sampling import axes_of
 from .sensors import normal
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft, CraftAt
 
 
 @dataclass(frozen=True)

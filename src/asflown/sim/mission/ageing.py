@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.integrate import cumulative_simpson
@@ -23,7 +24,9 @@ from scipy.signal import find_peaks
 
 from ...kit.errors import BadInput
 from ..flight import MovingPart, momentum_per_rate, moving_part
-from ..scenario import CoverMotion
+
+if TYPE_CHECKING:
+    from ..scenario import CoverMotion
 
 #: The first kind of motion lasts this long from motor-on (000 section V: minute 1.00 to 2.35). [s]
 BUILD_UP_S = 81.0

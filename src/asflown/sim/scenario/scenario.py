@@ -6,8 +6,7 @@ Times count from the epoch, at which recording starts.  docs/simulator.md lists 
 from __future__ import annotations
 
 from itertools import pairwise
-from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, model_validator
 
@@ -22,6 +21,9 @@ from .thrusters import BranchSwap, Burn, ThrusterControl, ThrusterFault, Thruste
 from .torques import AnyTorque, Passage
 from .units import RateVector, _by_name
 from .wheels import Coast, DragSpike, WheelBias
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 NoiseName = Literal["none", "half", "nominal", "double"]
 

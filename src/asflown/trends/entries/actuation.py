@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...craft.model import Craft, Mechanism
 from ...estimate.torque import TorqueResult, disturbance_torque
 from ...kit.ensemble import spread
 from ...kit.errors import BadInput, some_of
 from ...kit.timeline import NS, utc_label
 from ...telemetry.channels import AXES
 from ...telemetry.load import load_telemetry
-from ...telemetry.telemetry import Telemetry
 from ..entry import BEST, Curve, Entry, Value
-from .events import Event
 from .figures import FIGURES, Actuation, Torque, measure
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft, Mechanism
+    from ...telemetry.telemetry import Telemetry
+    from .events import Event
 
 #: Basis -> method and variant of the torque.
 BASES = {

@@ -7,7 +7,7 @@ import io
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -15,7 +15,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from ...kit.config import read_bytes, toml_table, validated
 from ...kit.errors import BadInput, some_of
 from ...kit.timeline import NS, utc_label, utc_to_tai_ns
-from ...telemetry.telemetry import Channel, Telemetry
+
+if TYPE_CHECKING:
+    from ...telemetry.telemetry import Channel, Telemetry
 
 #: A motor counts as running above this share of its largest current, and as stalled above the middle of the two levels.
 _RUNNING = 0.3

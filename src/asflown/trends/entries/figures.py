@@ -13,21 +13,25 @@ from __future__ import annotations
 
 import inspect
 import runpy
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.signal import find_peaks
 
-from ...craft.model import Mechanism
 from ...kit.ensemble import spread
 from ...kit.errors import BadInput
 from ...kit.plain import finite
-from ...telemetry.telemetry import Telemetry
 from ..entry import Value
 from .events import Event, stall
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ...craft.model import Mechanism
+    from ...telemetry.telemetry import Telemetry
 
 #: The first kind of motion lasts from the motor's start to minute 1.35 after it (000 section V: 1.00 to 2.35). [s]
 FIRST_PHASE_S = 81.0

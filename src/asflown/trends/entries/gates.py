@@ -5,12 +5,16 @@ far moves by little from one to the next, however much the engine has changed.""
 
 from __future__ import annotations
 
-from ...craft.model import Craft
-from ...estimate.gates import GatesFit, Interval, Part
+from typing import TYPE_CHECKING
+
 from ...kit.errors import BadInput
 from ...kit.plain import finite
 from ...kit.timeline import utc_label
 from ..entry import Entry, Value
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ...estimate.gates import GatesFit, Interval, Part
 
 KIND = "gates"
 #: What sigmas are judged by: about biases that are estimated, by the additive likelihood; others are kept under their own name.

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from ...craft.model import Craft, tensor
 from ...dynamics.rigid_body import ELEMENTS, elements_of
-from ...estimate.inertia import InertiaResult
 from ...kit.plain import finite
 from ...kit.timeline import utc_label
 from ...telemetry.channels import AXES
-from ...telemetry.telemetry import Telemetry
 from ..entry import Entry, Value
 from .of_record import record_entry
+
+if TYPE_CHECKING:
+    from ...estimate.inertia import InertiaResult
+    from ...telemetry.telemetry import Telemetry
 
 KIND = "inertia"
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from ...craft.model import Craft
+from typing import TYPE_CHECKING
+
 from ...kit.errors import BadInput
 from ...kit.timeline import utc_label
-from ...telemetry.telemetry import Telemetry
 from ..entry import Entry, Value
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ...telemetry.telemetry import Telemetry
 
 
 def record_entry(

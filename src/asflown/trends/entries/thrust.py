@@ -6,11 +6,15 @@ thrusters of one record share cancels, is far better known than its thrust."""
 
 from __future__ import annotations
 
-from ...craft.model import Craft
-from ...estimate.thrust import ThrustResult
-from ...telemetry.telemetry import Telemetry
+from typing import TYPE_CHECKING
+
 from ..entry import Entry, Value
 from .of_record import record_entry
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ...estimate.thrust import ThrustResult
+    from ...telemetry.telemetry import Telemetry
 
 KIND = "thrust"
 #: What a thrust is judged by is the joint method's; others are kept under their own name.

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from ...craft.model import Craft
-from ...estimate.wheels import WheelDrag, WheelsResult
+from typing import TYPE_CHECKING
+
 from ...kit.plain import finite
-from ...telemetry.telemetry import Telemetry
 from ..entry import Entry, Value
 from .of_record import record_entry
+
+if TYPE_CHECKING:
+    from ...craft.model import Craft
+    from ...estimate.wheels import WheelDrag, WheelsResult
+    from ...telemetry.telemetry import Telemetry
 
 KIND = "wheels"
 _BASIS = "telemetry"

@@ -7,11 +7,13 @@ curve is therefore moved and stretched in time (and, where size is judged elsewh
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
 
-from ..entry import Curve
+if TYPE_CHECKING:
+    from ..entry import Curve
 
 #: Curves are compared from the motor's start until this share of the median's squares is past, at so many instants.
 _PAST, _INSTANTS = 0.998, 241

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
 
 from ..entry import MOVES, Entry
 from .curves import TORQUE, distance
-from .slope import Trend
+
+if TYPE_CHECKING:
+    from .slope import Trend
 
 #: A rest of this long makes an actuation cold; the next one is warm when itself it comes within so long. [days]
 COLD_DAYS, WARM_DAYS = 200.0, 100.0

@@ -6,9 +6,9 @@ import os
 import re
 import sqlite3
 import time
-from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sqlalchemy import Connection, Engine, create_engine, event, func, select, text
 from sqlalchemy.engine import URL, make_url
@@ -17,6 +17,9 @@ from sqlalchemy.pool import QueuePool
 
 from ...kit.errors import BadInput
 from ...kit.files import check_place
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 #: How long to wait for another process that writes. [s]
 BUSY_S = 60.0

@@ -7,21 +7,24 @@ import re
 import threading
 import zipfile
 import zlib
-from collections.abc import Iterable
 from dataclasses import replace
 from datetime import UTC, datetime
-from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from sqlalchemy import Connection, Engine, exists, func, insert, inspect, select, text
-from sqlalchemy.engine import URL
 
 from ...kit.errors import BadInput, some_of
 from ...kit.plain import finite, plain
 from ..entry import Curve, Entry, Value
 from .place import label, plainly, reach, switch_to_wal, url_of, wait_for_turn
 from .schema import CURVE, ENTRY, HEAD, VALUE, VERSION_TABLE
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    from sqlalchemy.engine import URL
 
 #: alembic keeps its context in module globals.
 _MIGRATING = threading.Lock()

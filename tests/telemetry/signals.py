@@ -1,21 +1,10 @@
-"""Small made-up telemetry for the tests of the door."""
+"""A made-up slew, and noise."""
 
 import numpy as np
 
 from asflown.kit.rotations import quaternion
-from asflown.kit.timeline import NS, utc_to_tai_ns
-from asflown.telemetry.telemetry import Channel, Telemetry
-
-EPOCH = utc_to_tai_ns("2015-09-29T00:00:00")
-
-
-def telemetry_of(epoch_ns=EPOCH, **columns) -> Telemetry:
-    """name=(seconds, values) -> Telemetry, nothing screened."""
-    channels = {}
-    for name, (seconds, values) in columns.items():
-        at = np.rint(np.asarray(seconds, float) * NS).astype(np.int64) + epoch_ns
-        channels[name] = Channel(name, at, np.asarray(values), np.ones(len(at), bool))
-    return Telemetry(channels, epoch_ns)
+from asflown.telemetry.telemetry import Telemetry
+from flights import telemetry_of
 
 
 def noise(n, sigma=1.0, seed=0):

@@ -1,0 +1,151 @@
+"""The one way a verb runs: places checked, craft and telemetry in, an estimate, then store, files, figures, JSON or text.
+
+    job = Job(context)
+    result = torque(job.telemetry(), job.craft(), method=method)
+    job.finish(result)
+
+Options are read from the verb's own parameters by name (``craft``, ``inertia``, ``cm``, ``channels``, ``exclude``, ``start``,
+``stop``, ``out``, ``plot``, ``plot_dir``, ``store``, ``name``, ``json``), so that a verb states only what is its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from .output import print_doubts, print_json, say
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from ..craft.model import Craft
+    from ..kit.result import Estimate, Input
+    from ..telemetry.telemetry import Telemetry
+    from ..trends.entry import Entry
+
+#: Parameters that say how to answer, not what was asked: they are no part of the provenance's options.
+_NOT_OPTIONS = frozenset({"file", "files", "json", "plot", "plot_dir", "out", "store", "name", "channels", "exclude"})
+
+
+class Job:
+    """One run of a verb.  Raises BadInput at once where a file that is asked for cannot be written."""
+
+    def __init__(self, context: typer.Context):
+        self.given: dict[str, Any] = dict(context.params)
+        self.verb = context.command_path.partition(" ")[2].removesuffix(" fit")
+        self._check_places()
+
+    # ---- what goes in ----
+
+    @cached_property
+    def craft(self) -> Craft:
+        """The craft that --craft, --inertia and --cm name."""
+        from ..craft.load import load_craft
+        from ..kit.quantities import plain_numbers
+
+        inertia, cm = self.given.get("inertia"), self.given.get("cm")
+        return load_craft(
+            self.given["craft"],
+            inertia=plain_numbers(inertia, 6, "--inertia") if inertia is not None else None,
+            cm=plain_numbers(cm, 3, "--cm") if cm is not None else None,
+        )
+
+    def telemetry(self, file: Path | None = None) -> Telemetry:
+        """Telemetry through the door, cut to the window; of the verb's ``file`` unless another is named."""
+        from ..telemetry.load import load_telemetry
+
+        whole = load_telemetry(
+            file or self.given["file"],
+            channels=self.given.get("channels"),
+            exclude=self.given.get("exclude"),
+            craft=self.craft,
+        )
+        return whole.between(self.given.get("start"), self.given.get("stop"))
+
+    @property
+    def options(self) -> dict:
+        """What was asked, for the provenance."""
+        from ..kit.plain import plain
+
+        return {n: plain(v) for n, v in self.given.items() if n not in _NOT_OPTIONS}
+
+    # ---- what comes out ----
+
+    def finish(
+        self,
+        result: Estimate,
+        *,
+        inputs: Iterable[Input] = (),
+        options: dict | None = None,
+        more: dict | None = None,
+        entry: Callable[[Estimate, str | None], Entry] | None = None,
+        figures: Callable[[Estimate], dict] | None = None,
+        text: Callable[[], None] | None = None,
+        failed: bool = False,
+    ) -> None:
+        """Keep, write, draw and tell a result, in this order.
+
+        ``inputs``: files beside telemetry, dictionary, exclusions and craft; ``options``: settled values in place of those
+        given, such as the method chosen; ``more``: further keys of the JSON; ``entry``: makes the store's entry of the result
+        and the name given; ``figures``: all figures by name, for --plot-dir; ``text``: prints more after the table;
+        ``failed``: a check failed, which ends the program with exit code 3."""
+        result = replace(
+            result,
+            inputs=tuple(dict.fromkeys((*result.inputs, *inputs))),
+            options=self.options | (options or {}),
+        )
+        if self.given.get("store") is not None and entry is not None:
+            self._keep(entry(result, self.given.get("name")))
+        self._write(result, figures)
+        if self.given.get("json"):
+            print_json({"command": self.verb} | result.record() | (more or {}) | {"provenance": result.provenance})
+        else:
+            print(result)
+            if text is not None:
+                text()
+            print_doubts(result.doubts)
+        if failed:
+            raise typer.Exit(3)
+
+    def _write(self, result: Estimate, figures) -> None:
+        out, plot, plot_dir = (self.given.get(n) for n in ("out", "plot", "plot_dir"))
+        if out is not None:
+            result.save(out)
+            say(f"wrote {out}")
+        if plot is not None:
+            from ..plots import save_figure
+
+            save_figure(result, plot)
+            say(f"wrote {plot}")
+        if plot_dir is not None and figures is not None:
+            from ..plots.figure import save_figures
+
+            for path in save_figures(figures(result), plot_dir):
+                say(f"wrote {path}")
+
+    def _keep(self, entry: Entry) -> None:
+        from ..trends.store import TrendStore
+
+        with TrendStore.open(self.given["store"]) as trends:
+            kept = trends.add(entry)[0]
+        say(f"kept as {kept.event}, revision {kept.revision}")
+
+    def _check_places(self) -> None:
+        """Before the work: whether what it makes can be written."""
+        out, plot, plot_dir = (self.given.get(n) for n in ("out", "plot", "plot_dir"))
+        if out is None and plot is None and plot_dir is None:
+            return
+        from ..kit.files import check_folder, check_place
+        from ..plots.figure import picture_kind
+
+        for place in (out, plot):
+            if place is not None:
+                check_place(place)
+        if plot is not None:
+            picture_kind(plot)
+        if plot_dir is not None:
+            check_folder(plot_dir)

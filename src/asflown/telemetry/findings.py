@@ -1,0 +1,88 @@
+"""What the door finds: counted, told by `telemetry check`, and a doubt of every result that uses the channels concerned."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ..kit.doubts import Doubts, Kind, Severity
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something noticed in a channel ('' for the whole file), with how often and where first."""
+
+    channel: str
+    what: str  # duplicate, conflict, disorder, repeat, spike, stuck, still, wrap, fall, norm, nan, gap, dropout, orbit, ignored, excluded
+    count: int
+    first_tai_ns: int
+    detail: str
+
+
+_CHECK = "Run asflown telemetry check on the file."
+
+IMPLAUSIBLE = Kind(
+    "telemetry.implausible", Severity.SUSPECT,
+    "{channels}: values reach {largest:.4g} {unit}, beyond {limit_of} of {limit:.4g} {unit}{guess}",
+    "Check the unit in the heading or in the channel dictionary.",
+)  # fmt: skip
+ERROR_TOO_FAST = Kind(
+    "telemetry.attitude-error-scale", Severity.SUSPECT,
+    "{channels}: the attitude error changes {ratio:.3g} times as fast as the body turns: are the values mrad or deg labelled {unit}?",
+    "Check the unit in the heading or in the channel dictionary.",
+)  # fmt: skip
+RATE_SCALE = Kind(
+    "telemetry.rate-scale", Severity.SUSPECT,
+    "{channels}: the body rates are {ratio:.4g} times those of the quaternion: {guess}",
+    "Check the unit of the body rates.",
+)  # fmt: skip
+
+#: Findings of the door -> the doubt they are.  Those that are missing here cost nothing: samples merely
+#: absent (gap, dropout), left out by the user (excluded), or not asked for (ignored).
+OF_FINDING = {
+    "duplicate": Kind("telemetry.duplicates", Severity.NOTE,
+                      "{count} time stamps occur twice with the same values{where}; the first sample is used", _CHECK),
+    "conflict": Kind("telemetry.conflicts", Severity.SUSPECT,
+                     "{count} time stamps occur twice with different values{where}; the first sample is used", _CHECK),
+    "disorder": Kind("telemetry.disorder", Severity.CAUTION, "{count} samples arrived late and were sorted into place{where}", _CHECK),
+    "repeat": Kind("telemetry.repeats", Severity.CAUTION,
+                   "{count} samples repeat the previous value bit for bit{where}: stale frames", _CHECK),
+    "spike": Kind("telemetry.spikes", Severity.CAUTION, "{count} spikes were left out{where}", _CHECK),
+    "stuck": Kind("telemetry.stuck", Severity.CAUTION,
+                  "a noisy sensor says one value for {count} samples{where}; they were left out", _CHECK),
+    "still": Kind("telemetry.still", Severity.CAUTION,
+                  "one value is repeated for {count} samples{where}: a dead sensor, or no motion? They are used", _CHECK),
+    "wrap": Kind("telemetry.wraps", Severity.NOTE, "{count} declared wraps were undone{where}"),
+    "fall": Kind("telemetry.falls", Severity.SUSPECT,
+                 "a counter falls or a value jumps over its whole range {count} times{where}: an undeclared wrap or a reset?",
+                 "Declare the wrap in a channel dictionary, or divide the record at the reset."),
+    "norm": Kind("telemetry.norm", Severity.SUSPECT, "{count} quaternions are not of length one; they were left out", _CHECK),
+    "nan": Kind("telemetry.nan", Severity.NOTE, "{count} cells say 'nan'{where}; they count as blank"),
+    "orbit": Kind("telemetry.no-orbit", Severity.CAUTION, "{count} quaternions lie outside the known orbit; they were left out"),
+}  # fmt: skip
+
+
+def found_in(findings: Iterable[Finding], used: Iterable[str]) -> Doubts:
+    """One doubt a kind for the channels used; a finding about the whole file concerns them all."""
+    used = set(used)
+    by_kind: dict[str, list[Finding]] = {}
+    for f in findings:
+        if f.what in OF_FINDING and used and (not f.channel or f.channel in used):
+            by_kind.setdefault(f.what, []).append(f)
+    doubts = []
+    for what, those in by_kind.items():
+        channels = list(dict.fromkeys(f.channel for f in those if f.channel))
+        where = (
+            f" in {', '.join(channels[:3])}{f' and {len(channels) - 3} more' if len(channels) > 3 else ''}"
+            if channels
+            else ""
+        )
+        doubts.append(
+            OF_FINDING[what](count=sum(f.count for f in those), where=where, channels=channels).passed_on_by(
+                "telemetry"
+            )
+        )
+    return Doubts(doubts)
