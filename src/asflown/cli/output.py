@@ -42,7 +42,7 @@ def progress():
     return say if sys.stderr.isatty() else None
 
 
-def print_doubts(doubts: Doubts) -> None:
+def print_doubts(doubts) -> None:
     """Doubts in words under every text result, the gravest first; suspect and void ones are marked."""
     from ..kit.doubts import Doubts, doubt_mark
 
