@@ -14,11 +14,10 @@ import time
 import numpy as np
 from scipy import optimize
 
-from asflown.estimate.gates.fit import problems
 from asflown.estimate.gates.likelihood import Problem
+from asflown.estimate.gates.likelihoods import problems
 from asflown.maneuvers.history import past_model
-from asflown.sim.maneuver_sets import MAIN_ENGINE_SET
-from asflown.sim.maneuver_sets import execute
+from asflown.sim.maneuver_sets import MAIN_ENGINE_SET, execute
 
 REFITS = 1000
 

@@ -17,13 +17,11 @@ from dataclasses import replace
 import numpy as np
 from scipy import stats
 
-from asflown.estimate.gates.fit import problems
 from asflown.estimate.gates.foreseen import foresee
+from asflown.estimate.gates.likelihoods import problems
 from asflown.estimate.gates.power import alarm_chance
 from asflown.maneuvers.history import past_model
-from asflown.sim.maneuver_sets import MAIN_ENGINE_SET
-from asflown.sim.maneuver_sets import RCS_SET
-from asflown.sim.maneuver_sets import execute
+from asflown.sim.maneuver_sets import MAIN_ENGINE_SET, RCS_SET, execute
 
 LIMIT_P = 0.05 / 3 / 25
 #: Model, burns it is flown with, and per size of the last burn [m/s] by which shares it falls short.

@@ -18,34 +18,31 @@ from dataclasses import replace
 
 import numpy as np
 
-from asflown.estimate.gates.fit import fit_gates
+from asflown.estimate.gates import gates
 from asflown.maneuvers.history import past_model
-from asflown.sim.maneuver_sets import MAIN_ENGINE_SET
-from asflown.sim.maneuver_sets import RCS_SET
-from asflown.sim.maneuver_sets import Tracking
-from asflown.sim.maneuver_sets import execute
+from asflown.sim.maneuver_sets import MAIN_ENGINE_SET, RCS_SET, Tracking, execute
 
 SETS = {"main-engine": MAIN_ENGINE_SET, "rcs": RCS_SET}
 #: Orbit determination that sees small burns no better than large ones.
 HARD = {"main-engine": Tracking(1e-3, 0.0, scatter=3.2), "rcs": Tracking(0.2e-3, 0.0, scatter=4.0)}
 
 
-def truths(gates) -> dict[str, float]:
-    (fx, fy), (px, py) = gates.pointing_bias_fixed_mps, gates.pointing_bias_proportional_rad
+def truths(model) -> dict[str, float]:
+    (fx, fy), (px, py) = model.pointing_bias_fixed_mps, model.pointing_bias_proportional_rad
     return {
-        "magnitude fixed": gates.magnitude_fixed_mps, "magnitude proportional": gates.magnitude_proportional,
-        "magnitude bias fixed": gates.bias_fixed_mps, "magnitude bias proportional": gates.bias_proportional,
-        "pointing fixed": gates.pointing_fixed_mps, "pointing proportional": gates.pointing_proportional_rad,
+        "magnitude fixed": model.magnitude_fixed_mps, "magnitude proportional": model.magnitude_proportional,
+        "magnitude bias fixed": model.bias_fixed_mps, "magnitude bias proportional": model.bias_proportional,
+        "pointing fixed": model.pointing_fixed_mps, "pointing proportional": model.pointing_proportional_rad,
         "pointing bias X fixed": fx, "pointing bias X proportional": px, "pointing bias Y fixed": fy, "pointing bias Y proportional": py,
     }  # fmt: skip
 
 
-def soiled(m, gates, share: float, rng):
+def soiled(m, model, share: float, rng):
     """A share of the burns 6 of the model's sigmas farther off, in magnitude to either side, in pointing anywhere."""
     bad = rng.random(len(m)) < share
     side, turn = rng.choice([-1.0, 1.0], len(m)), rng.uniform(0, 2 * np.pi, len(m))
-    along = 6 * gates.sigma_magnitude(m.dv_mps) * side * bad
-    across = 6 * (gates.sigma_pointing(m.dv_mps) * bad)[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    along = 6 * model.sigma_magnitude(m.dv_mps) * side * bad
+    across = 6 * (model.sigma_pointing(m.dv_mps) * bad)[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     return replace(
         m, magnitude_error_mps=m.magnitude_error_mps + along, pointing_error_mps=m.pointing_error_mps + across
     )
@@ -55,17 +52,17 @@ def campaign(
     engine: str, sets: int, count: int | None = None, hard: bool = False, seed: int = 2012, outliers: float = 0.0, **how
 ) -> dict[str, dict]:
     """Median over truth, share on the bound, coverage and median upper end of every parameter."""
-    gates = past_model(f"{engine}/2012-1").model
+    model = past_model(f"{engine}/2012-1").model
     burns = SETS[engine]
     burns = replace(burns, count=count or burns.count, tracking=HARD[engine] if hard else burns.tracking)
-    truth = truths(gates)
+    truth = truths(model)
     found = np.empty((sets, len(truth)))
     ends = np.empty((sets, len(truth), 2))
     for n in range(sets):
-        flown = execute(gates, burns, [seed, n])
-        fit = fit_gates(soiled(flown, gates, outliers, np.random.default_rng([seed, n, 1])), **how)
-        found[n] = [x for p in fit.parts for x in (p.point.fixed, p.point.proportional, *p.point.beta)]
-        intervals = [i for p in fit.parts for i in (*p.sigmas, *p.biases)]
+        flown = execute(model, burns, [seed, n])
+        fit = gates(soiled(flown, model, outliers, np.random.default_rng([seed, n, 1])), **how)
+        found[n] = [x for p in fit.parts for x in p.point.values]
+        intervals = [i for p in fit.parts for i in p.ci95]
         ends[n] = [[-np.inf if low is None else low, np.inf if high is None else high] for low, high in intervals]
     rows = {}
     for j, (name, value) in enumerate(truth.items()):

@@ -15,11 +15,11 @@ import argparse
 
 import numpy as np
 
+from asflown.estimate.gates import gates_watch
 from asflown.estimate.gates.power import alarm_chance
-from asflown.estimate.gates.watch import watch_maneuvers
+from asflown.estimate.gates.watch import Alarm
 from asflown.maneuvers.history import past_model
-from asflown.sim.maneuver_sets import A_BRANCH_END
-from asflown.sim.maneuver_sets import a_branch
+from asflown.sim.maneuver_sets import A_BRANCH_END, a_branch
 
 FIRST, SMALL, LAST = A_BRANCH_END
 
@@ -28,13 +28,13 @@ def story(weaker: float, seed, given: bool = False) -> tuple[float, ...]:
     """An alarm before OTM-160; by OTM-160 alone, its power; by either burn alone, the power; in any way; at OTM-166."""
     past = past_model("rcs/2008-01")
     m = a_branch(past.model, weaker, seed)
-    w = watch_maneuvers(m, against=past if given else None)
+    w = gates_watch(m, against=past if given else None)
     by = {b.id: b for b in w.burns}
-    alone = {i: "one burn" in by[i].alarms for i in (FIRST, LAST)}
+    alone = {i: Alarm.ONE_BURN in by[i].alarms for i in (FIRST, LAST)}
     said = alarm_chance(by[FIRST].foreseen, weaker * by[FIRST].dv_mps, w.limit_p)
     either = said
     if not alone[FIRST]:
-        sound = None if given else watch_maneuvers(m.without([FIRST, SMALL], "weak"), first=LAST).burns[0].foreseen
+        sound = None if given else gates_watch(m.without([FIRST, SMALL], "weak"), first=LAST).burns[0].foreseen
         either += alarm_chance(by[LAST].foreseen, weaker * by[LAST].dv_mps, w.limit_p, drawn=sound)
     return (
         any(b.alarms for b in w.burns if b.id not in A_BRANCH_END), alone[FIRST], said, alone[FIRST] or alone[LAST], either,

@@ -22,17 +22,14 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from asflown.craft.load import load_craft
-from asflown.dynamics.rigid_body import ELEMENTS
-from asflown.dynamics.rigid_body import elements_of
-from asflown.estimate.inertia.record import slew_record
-from asflown.estimate.inertia.tensor import RATE_SCALE
-from asflown.estimate.inertia.tensor import WHEEL_SCALE
-from asflown.estimate.inertia.tensor import inertia_tensor
+from asflown.dynamics.rigid_body import ELEMENTS, elements_of
+from asflown.estimate.inertia.gather import slew_record
+from asflown.estimate.inertia.tensor import RATE_SCALE, inertia
 from asflown.estimate.inertia.whole_motion import fit_slews
+from asflown.estimate.subject import SPIN_SHARE
 from asflown.estimate.subject.subject import subject_of
 from asflown.sim.flight.closed_loop import fly
-from asflown.sim.flight.sensors import NOISE
-from asflown.sim.flight.sensors import stream
+from asflown.sim.flight.sensors import NOISE, stream
 
 CONDITIONS = {
     "nominal": {},
@@ -51,12 +48,12 @@ CONDITIONS = {
 def one(task):
     scenario, seed, changes, more = task
     craft = load_craft("cassini")
-    flight = fly(scenario, seed=seed, **changes)
+    flight = fly(scenario, seed=seed, changes=changes)
     truth = elements_of(flight.inertia_kgm2)
-    result = inertia_tensor(flight.telemetry, craft)
-    sigma = elements_of(result.sigma_random)
-    out = {"error": elements_of(result.inertia) - truth, "sigma": sigma,
-           "torque": result.torque - _torque(flight), "torque_sigma": result.torque_sigma}  # fmt: skip
+    result = inertia(flight.telemetry, craft)
+    sigma = elements_of(result.inertia_sigma_random_kgm2)
+    out = {"error": elements_of(result.inertia_kgm2) - truth, "sigma": sigma,
+           "torque": result.external_torque_Nm - _torque(flight), "torque_sigma": result.external_torque_sigma_Nm}  # fmt: skip
     if more:
         noise = NOISE[changes.get("noise", "nominal")]
         record = slew_record(subject_of(flight.telemetry, craft, moving=None))
@@ -68,17 +65,15 @@ def one(task):
         fit = fit_slews(record, levels=known)
         out["bound"] = np.sqrt(np.diag(fit.covariance)[:6])
 
-        wheel = WHEEL_SCALE * stream(seed, "wheel scale").standard_normal()
+        wheel = SPIN_SHARE * stream(seed, "wheel scale").standard_normal()
         rate = RATE_SCALE * stream(seed, "rate scale").standard_normal()
         wheels = tuple(w.model_copy(update={"spin_inertia": w.spin_inertia * (1 + wheel)}) for w in craft.wheels)
         channels = {
             n: replace(c, values=c.values * (1 + rate)) if n.startswith("body_rate") else c
             for n, c in flight.telemetry.channels.items()
         }
-        drawn = inertia_tensor(
-            replace(flight.telemetry, channels=channels), craft.model_copy(update={"wheels": wheels})
-        )
-        out["drawn"] = (elements_of(drawn.inertia) - truth) / elements_of(drawn.sigma_total)
+        drawn = inertia(replace(flight.telemetry, channels=channels), craft.model_copy(update={"wheels": wheels}))
+        out["drawn"] = (elements_of(drawn.inertia_kgm2) - truth) / elements_of(drawn.inertia_sigma_kgm2)
     return out
 
 

@@ -24,13 +24,12 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from asflown.craft.load import load_craft
-from asflown.estimate.inertia.motion import instants
-from asflown.estimate.inertia.motion import linearized
-from asflown.estimate.inertia.record import slew_record
-from asflown.estimate.inertia.tensor import inertia_tensor
-from asflown.estimate.inertia.whole_motion import carried
-from asflown.estimate.inertia.whole_motion import fit_slews
-from asflown.estimate.inertia.whole_motion import solved
+from asflown.estimate.inertia.gather import slew_record
+from asflown.estimate.inertia.likelihood import Around, solved
+from asflown.estimate.inertia.linear import linearized
+from asflown.estimate.inertia.motion import Reference, instants
+from asflown.estimate.inertia.tensor import inertia
+from asflown.estimate.inertia.whole_motion import carried, fit_slews
 from asflown.estimate.subject.subject import subject_of
 from asflown.kit.regressed import run
 from asflown.sim.flight.closed_loop import fly
@@ -79,18 +78,20 @@ def main() -> None:
     layout, away = fit.layout, fit.beta.copy()
     away[:6] *= 1.02  # where both begin: a tensor 2 % off, and no torque
     away[layout.torque] = 0
-    scale = np.sqrt(np.diag(fit.covariance))
+    scale = fit.sigma
+    free = Around(np.zeros((layout.size, layout.size)), np.zeros(layout.size))
 
     def model_at(beta):
-        motion = fit.motion.at(instants(record, layout, beta))
-        model = linearized(record, layout, beta, motion, "body", fit.levels, np.eye(3))
-        return model.at(fit.levels, carried(fit.loosened, fit.motion, motion), np.ones(len(model.y), bool))
+        motion = fit.motion.at(instants(record, beta))
+        model = linearized(Reference(record, beta, motion), "body", fit.levels, np.eye(3))
+        loosened = carried(fit.weighted.loosened, fit.motion, motion)
+        return model.at(fit.levels, loosened, np.ones(len(model.y), bool))
 
     def ours():
         beta = away.copy()
         for _ in range(8):
             f = run(model_at(beta))
-            step = solved(f, layout, np.zeros((layout.size, layout.size)), np.zeros(layout.size))[0]
+            step = solved(f, layout, free)[0]
             beta += step
             if np.max(np.abs(step) / scale) < 1e-3:
                 break
@@ -117,9 +118,9 @@ def main() -> None:
     print(f"whole fit, levels fitted too                  {1e3 * whole:10.1f} ms")
     if asked.day:
         rates = {"wheel_rate": "0.25 s", "body_rate": "0.25 s", "quaternion": "0.25 s", "attitude_error": "0 s"}
-        day = fly("slews", seed=1, duration="86400 s", telemetry=rates).telemetry
+        day = fly("slews", seed=1, changes={"duration": "86400 s", "telemetry": rates}).telemetry
         samples = sum(len(c.values) for c in day.channels.values())
-        result, took = timed(lambda: inertia_tensor(day, craft), 1)
+        result, took = timed(lambda: inertia(day, craft), 1)
         print(f"a day at 4 Hz, {samples:,} samples             {took:10.1f} s    {result.settings['rounds']} rounds")
 
 

@@ -27,12 +27,7 @@ import numpy as np
 
 from asflown.craft.load import load_craft
 from asflown.dynamics.pulses import Valve
-from asflown.estimate.firing.priors import CENTER_SIGMA
-from asflown.estimate.firing.priors import FALL
-from asflown.estimate.firing.priors import FALL_SIGMA
-from asflown.estimate.firing.priors import MASS_SHARE
-from asflown.estimate.firing.priors import UNLIKE
-from asflown.estimate.firing.priors import priors_for
+from asflown.estimate.firing.priors import CENTER_SIGMA, FALL, FALL_SIGMA, MASS_SHARE, UNLIKE, priors_for
 from asflown.estimate.thrust.methods import thrust
 from asflown.sim.flight.closed_loop import fly
 from asflown.sim.scenario.scenario import load_scenario
@@ -72,10 +67,7 @@ def flown(seed: int, alike: bool):
             name,
             craft=craft,
             seed=seed,
-            thrusters=how,
-            thruster_faults=weak,
-            telemetry=sampling,
-            craft_mass=f"{mass} kg",
+            changes={"thrusters": how, "thruster_faults": weak, "telemetry": sampling, "craft_mass": f"{mass} kg"},
         )
     return flights, F, fall, center
 
@@ -107,10 +99,12 @@ def one(seed: int, alike: bool, unlike: float) -> dict:
         steady, flew = impulse @ F / impulse.sum(), impulse.sum() / valve.effective(lengths).sum()
         records = [thinned(flights[k].telemetry, count, counted) for k in keys]
         r = thrust(records, BASE, priors=priors_for(BASE, mass_kg=MASS, unlike=unlike))
-        singles = [(r.thrust_N[t.name] - f) / r.sigma_N[t.name] for t, f in zip(BASE.thrusters, F, strict=True) if r.thrust_N[t.name] is not None]  # fmt: skip
-        errors = np.array([r.mean_thrust_N - steady, r.mean_thrust_N - flew, r.fall_time_s - fall, *(np.array(r.center_m) - center)[:2]])  # fmt: skip
-        sigmas = np.array([r.mean_sigma_N, r.mean_sigma_N, r.fall_time_sigma_s, *r.center_sigma_m[:2]])
-        found[case] = (errors, errors / sigmas, singles, r.mean_sigma_N)
+        singles = [(r.thrust_N[t.name] - f) / r.thrust_sigma_N[t.name] for t, f in zip(BASE.thrusters, F, strict=True) if r.thrust_N[t.name] is not None]  # fmt: skip
+        errors = np.array([r.mean_thrust_N - steady, r.mean_thrust_N - flew, r.fall_time_s - fall, *(np.array(r.center_of_mass_m) - center)[:2]])  # fmt: skip
+        sigmas = np.array(
+            [r.mean_thrust_sigma_N, r.mean_thrust_sigma_N, r.fall_time_sigma_s, *r.center_of_mass_sigma_m[:2]]
+        )
+        found[case] = (errors, errors / sigmas, singles, r.mean_thrust_sigma_N)
     return found
 
 

@@ -27,18 +27,15 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import numpy as np
 from scipy import signal
 
-from asflown import disturbance_torque
-from asflown import fly
-from asflown import load_craft
+import asflown
+from asflown import fly, load_craft
+from asflown.estimate.fused.body import AxisData
 from asflown.estimate.fused.corners import draw_torques
 from asflown.estimate.fused.fuse import CONSIDERED
-from asflown.estimate.fused.held_body import HeldBody
-from asflown.estimate.fused.held_body import LoopLevels
+from asflown.estimate.fused.held_body import HeldBody, LoopLevels
 from asflown.estimate.fused.levels import fit_levels
 from asflown.estimate.fused.peaks import PEAK_REACH_S
-from asflown.estimate.fused.series import Series
-from asflown.estimate.fused.series import arrange
-from asflown.estimate.fused.series import step_of
+from asflown.estimate.fused.series import Series, arrange, step_of
 from asflown.estimate.fused.smooth_torque import gaussian_torque
 from asflown.estimate.torque.compare import best_lag
 from asflown.kit.ensemble import simulate
@@ -147,7 +144,7 @@ def one(job) -> dict:
         ("transfer", {"method": "transfer", "variant": "printed"}),
     ):
         try:
-            r = disturbance_torque(flight.telemetry, craft, axis="y", **how)
+            r = asflown.torque(flight.telemetry, craft, axis="y", **how)
         except BadInput:
             found["failed"] += name == "fused"
             continue
@@ -163,7 +160,7 @@ def one(job) -> dict:
 
 def judged(r, true, error, peaks, corners) -> dict:
     """Band, lag, corners and peak figures of one fused result."""
-    sigma = r.sigma_Nm[:, 1]
+    sigma = r.torque_sigma_Nm[:, 1]
     inside = {}
     for share, sigmas in ((0.68, 1.0), (0.95, 1.96)):
         low, high = r.band(share)
@@ -178,9 +175,9 @@ def judged(r, true, error, peaks, corners) -> dict:
     if peaks:
         figures = [(r.peak(a, PEAK_REACH_S, "y"), v) for a, v in peaks]
         found["peak_percent"] = float(np.mean([100 * (p.torque_Nm / v - 1) for p, v in figures]))
-        found["peak_sigma_percent"] = float(np.mean([100 * p.sigma_Nm / abs(v) for p, v in figures]))
+        found["peak_sigma_percent"] = float(np.mean([100 * p.torque_sigma_Nm / abs(v) for p, v in figures]))
         found["peak_95"] = float(np.mean([p.holds(v) for p, v in figures]))
-        found["peak_sigma_95"] = float(np.mean([abs(p.torque_Nm - v) < 1.96 * p.sigma_Nm for p, v in figures]))
+        found["peak_sigma_95"] = float(np.mean([abs(p.torque_Nm - v) < 1.96 * p.torque_sigma_Nm for p, v in figures]))
     return found
 
 
@@ -213,7 +210,7 @@ def random_event(seed: int) -> dict:
     )
     telemetry = spiked(flight.telemetry, 0.01, seed) if rng.random() < 0.3 else flight.telemetry
     try:
-        r = disturbance_torque(telemetry, load_craft("cassini"), method="fused")
+        r = asflown.torque(telemetry, load_craft("cassini"), method="fused")
     except BadInput as why:
         return {"seed": seed, "failed": str(why).splitlines()[0]}
     j = "xyz".index(axis)
@@ -221,7 +218,7 @@ def random_event(seed: int) -> dict:
     low, high = r.band(0.95)
     true = r.torque_Nm[:, j] - error
     return {
-        "seed": seed, "failed": "" if np.isfinite(r.torque_Nm).all() and np.isfinite(r.sigma_Nm).all() else "not finite",
+        "seed": seed, "failed": "" if np.isfinite(r.torque_Nm).all() and np.isfinite(r.torque_sigma_Nm).all() else "not finite",
         "share": float(np.sqrt(np.mean(error**2)) / np.std(true)), "loop": r.settings["loop"],
         "band_95": float(np.mean((low[:, j] <= true) & (true <= high[:, j]))),
     }  # fmt: skip
@@ -260,13 +257,11 @@ def near_the_bound(job) -> tuple[float, float, float, float]:
     bound = body.inertia_kgm2**2 * best.covariance[:, body.torque, body.torque].mean()
     at = times.seconds[step_of(data)]
     fit = fit_levels(body, [Series(r, at[data.row == r], data.value[data.row == r]) for r, _ in rows])
-    again, measured = arrange(fit.series, np.arange(481.0))
+    axis = AxisData.of(body, fit.levels, fit.series, np.arange(481.0))
     errors = []
     for solve in (gaussian_torque, draw_torques):
-        post = solve(
-            body, fit.levels, again, measured, np.empty((len(measured.row), 0)), 400, np.random.default_rng(seed)
-        )
-        errors.append(float(np.mean((post.mean[again.wanted] - torque[times.wanted]) ** 2)))
+        post = solve(axis, 400, np.random.default_rng(seed))
+        errors.append(float(np.mean((post.mean[axis.times.wanted] - torque[times.wanted]) ** 2)))
     return float(bound), float(np.mean((body.inertia_kgm2 * best.mean[:, body.torque] - torque) ** 2)), *errors
 
 

@@ -13,18 +13,11 @@ from skmisc.loess import loess
 from statsmodels.tsa.statespace import kalman_filter, kalman_smoother
 
 import asflown
-from asflown.estimate.fused.held_body import HeldBody
-from asflown.estimate.fused.held_body import LoopLevels
-from asflown.estimate.fused.series import ATTITUDE_ERROR
-from asflown.estimate.fused.series import BODY_RATE
-from asflown.estimate.fused.series import MOMENTUM
-from asflown.estimate.fused.series import Series
-from asflown.estimate.fused.series import arrange
+from asflown.estimate.fused.held_body import HeldBody, LoopLevels
+from asflown.estimate.fused.series import ATTITUDE_ERROR, BODY_RATE, MOMENTUM, Series, arrange
 from asflown.kit.ensemble import simulate
 from asflown.kit.regression import local_polynomial
-from asflown.kit.smoother import Measurements
-from asflown.kit.smoother import Model
-from asflown.kit.smoother import smooth
+from asflown.kit.smoother import Measurements, Model, smooth
 
 _DAY_S = 86_400
 _CADENCE_S = {ATTITUDE_ERROR: 2, BODY_RATE: 4, MOMENTUM: 4}
@@ -141,7 +134,7 @@ def event() -> None:
     craft, flight = asflown.load_craft("cassini"), asflown.fly("profile-1", seed=1)
 
     def work():
-        return asflown.disturbance_torque(flight.telemetry, craft, method="fused", axis="y")
+        return asflown.torque(flight.telemetry, craft, method="fused", axis="y")
 
     work()
     print(f"The fused torque of one axis, profile-1: {best_of(3, work)[0]:.2f} s")

@@ -25,8 +25,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import numpy as np
 
-from asflown.trends.entry import Entry
-from asflown.trends.entry import Value
+from asflown.trends.entry import Entry, Value
 from asflown.trends.verdicts import judge
 
 DATES = (

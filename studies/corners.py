@@ -50,9 +50,8 @@ from itertools import count
 
 import numpy as np
 
-from asflown import disturbance_torque
-from asflown import fly
-from asflown import load_craft
+import asflown
+from asflown import fly, load_craft
 from asflown.estimate.fused import corners
 from asflown.sim.scenario.scenario import load_scenario
 
@@ -123,7 +122,7 @@ def chosen(changes: dict):
 
 
 def judged(flight) -> tuple[float, float, float]:
-    r = disturbance_torque(flight.telemetry, CRAFT, axis="y", method="fused")
+    r = asflown.torque(flight.telemetry, CRAFT, axis="y", method="fused")
     true = np.interp(r.time_s, flight.truth.time_s, flight.truth.torque_Nm[:, 1])
     inside = []
     for share in (0.95, 0.68):

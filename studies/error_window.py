@@ -12,8 +12,7 @@ import sys
 
 import numpy as np
 
-from asflown import fly
-from asflown import load_craft
+from asflown import fly, load_craft
 from asflown.estimate.torque import transfer as torque_transfer
 
 sys.path.insert(0, __file__.rsplit("/", 1)[0])

@@ -3,7 +3,7 @@
 Run: python studies/flyby_density.py [FLIGHTS [KIND]]      (of each; 40 of all take ten minutes)
 
 Scenarios e3, e4, e9, e5 and titan at nominal noise, the method that asflown density takes by itself; on thrusters, sampled every 4 s, the thrust is
-drawn with a sigma of 5 % about the one believed.  Jets of 004 Table 3, exponent 1 (a cusp where an axis is crossed) and 2 (a round top).
+drawn with a sigma of 5 % about the one believed.  Jets of the plume paper's Table 3, exponent 1 (a cusp where an axis is crossed) and 2 (a round top).
 
 Answer, 2026-11: the table in docs/theory/density.md.  The torque from on-times bends alike within 6 s (_ALIKE_S): on 16 flights E5, exponents 1 and 2,
 peaks are 11.1 and 3.1 % low with 4 s, 12.2 and 3.1 % with 6, 13.9 and 3.3 % with 12, 15.4 and 4.7 % with 24, RMS 2.5 and 1.9, 2.5 and 1.8, 2.8 and 1.9, 3.1 and
@@ -34,28 +34,28 @@ KINDS = {
 def row(craft, scenario: str, closest_s: float, gas: dict, seed: int):
     thrust = 1.01 * (1 + 0.05 * np.random.default_rng(seed).standard_normal())
     on_thrusters = {"thrusters": {"thrust": f"{thrust:.4f} N"}} if scenario in ("e5", "titan") else {}
-    f = fly(scenario, seed=seed, flyby=gas, **on_thrusters)
+    f = fly(scenario, seed=seed, changes={"flyby": gas, **on_thrusters})
     r = density(f.telemetry, craft, f.met.flyby.name, closest_s, **HELD)
     at, rho, _, _ = f.met.peak
     truth = np.interp(r.time_s + closest_s, f.truth.time_s, f.truth.density_kgm3)
     inside = truth > 0.02 * rho
     off, late = r.peak.density_kgm3 - rho, r.peak.time_s + closest_s - at
     rms = np.sqrt(np.mean((r.density_kgm3 - truth)[inside] ** 2)) / rho
-    pull = np.sqrt(np.mean(((r.density_kgm3 - truth) / r.sigma_shape_kgm3)[inside] ** 2))
+    pull = np.sqrt(np.mean(((r.density_kgm3 - truth) / r.density_sigma_shape_kgm3)[inside] ** 2))
     found = [
         100 * off / rho,
         late,
         100 * rms,
-        off / r.peak.sigma_shape_kgm3,
-        late / r.peak.sigma_time_s,
+        off / r.peak.density_sigma_shape_kgm3,
+        late / r.peak.time_sigma_s,
         pull,
     ]
     if r.atmosphere is not None:
         a, truth_m = r.atmosphere, f.met.flyby.moon.atmosphere
         found += [
             100 * (a.density_kgm3 / truth_m.density_kgm3 - 1), a.scale_height_m / 1e3,
-            a.density_95[0] <= truth_m.density_kgm3 <= a.density_95[1],
-            a.scale_height_95[0] <= truth_m.scale_height_m <= a.scale_height_95[1],
+            a.density_ci95_kgm3[0] <= truth_m.density_kgm3 <= a.density_ci95_kgm3[1],
+            a.scale_height_ci95_m[0] <= truth_m.scale_height_m <= a.scale_height_ci95_m[1],
         ]  # fmt: skip
     return found
 

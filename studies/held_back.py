@@ -22,13 +22,8 @@ import numpy as np
 import asflown
 from asflown.estimate.fused.free_body import FreeBody
 from asflown.estimate.fused.gather import gather
-from asflown.estimate.fused.held_back import APART
-from asflown.estimate.fused.held_back import HeldBack
-from asflown.estimate.fused.held_back import between_ends
-from asflown.estimate.fused.held_back import blocks
-from asflown.estimate.fused.held_back import hold_back
-from asflown.estimate.fused.levels import OUTLYING
-from asflown.estimate.fused.levels import fit_levels
+from asflown.estimate.fused.held_back import APART, HeldBack, between_ends, blocks, hold_back
+from asflown.estimate.fused.levels import OUTLYING, fit_levels
 from asflown.estimate.fused.series import ROWS
 from asflown.estimate.subject.subject import subject_of
 

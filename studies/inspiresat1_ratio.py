@@ -22,12 +22,7 @@ from scipy.spatial.transform import Rotation
 
 import asflown
 from asflown.dynamics.momentum import wheel_momentum
-from asflown.plots.figure import BLUE
-from asflown.plots.figure import GREY
-from asflown.plots.figure import ORANGE
-from asflown.plots.figure import RED
-from asflown.plots.figure import new_figure
-from asflown.plots.figure import save
+from asflown.plots.figure import BLUE, GREY, ORANGE, RED, new_figure, save
 
 ROOT = Path(__file__).resolve().parents[1]
 RECORDING = (

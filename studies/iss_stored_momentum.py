@@ -24,15 +24,8 @@ from asflown.dynamics.environment import gravity_gradient
 from asflown.dynamics.momentum import stored_momentum
 from asflown.kit.regression import local_polynomial
 from asflown.kit.rotations import rotation
-from asflown.kit.timeline import NS
-from asflown.kit.timeline import segments
-from asflown.plots.figure import BLUE
-from asflown.plots.figure import GREY
-from asflown.plots.figure import ORANGE
-from asflown.plots.figure import RED
-from asflown.plots.figure import breaks
-from asflown.plots.figure import new_figure
-from asflown.plots.figure import save
+from asflown.kit.timeline import NS, segments
+from asflown.plots.figure import BLUE, GREY, ORANGE, RED, breaks, new_figure, save
 from asflown.telemetry.attitude import together
 from asflown.telemetry.screening import noise_sigma
 
@@ -147,13 +140,13 @@ def main(folder: Path | None = None) -> None:
     )
     results = {}
     for window in (None, LONG_WINDOW_S):
-        result = results[window] = asflown.disturbance_torque(telemetry, craft, method="momentum", window_s=window)
+        result = results[window] = asflown.torque(telemetry, craft, method="momentum", window_s=window)
         half = result.settings["half_width_s"]
         known = np.isfinite(result.torque_Nm).all(axis=1)
         for j, axis in enumerate(AXES):
             T, g = result.torque_Nm[known, j], np.interp(result.time_s[known], at, gravity[:, j])
             noise = noise_sigma(telemetry.channel(f"body_rate_{axis}"))
-            print(f"  {2 * half:4.0f} s   {axis}    {T.mean():+6.2f} {T.std():6.2f} {np.median(result.sigma_Nm[known, j]):12.2f}"
+            print(f"  {2 * half:4.0f} s   {axis}    {T.mean():+6.2f} {T.std():6.2f} {np.median(result.torque_sigma_Nm[known, j]):12.2f}"
                   f" {noise:20.1e} {I_B[j, j] * noise * slope_noise(half):17.2f} {g.mean():+18.2f} {g.std():6.2f}"
                   f" {np.corrcoef(T, g)[0, 1]:+10.2f}")  # fmt: skip
         print(f"           known {known.mean():.1%} of the time; the rest is null")

@@ -2,7 +2,7 @@
 
 Run: python studies/jets_fits.py [FLIGHTS]      (20 take ten minutes)
 
-Simulated flybys E3 with the jets of 004 Table 3, exponent 1, nominal noise, fitted with that exponent; records run on after the plume.
+Simulated flybys E3 with the jets of the plume paper's Table 3, exponent 1, nominal noise, fitted with that exponent; records run on after the plume.
 For each fit: how often the 95 % intervals hold the truth, how wide they are as a share of it (median; open ones count as infinite),
 how often Alexandria is told to be there, and the error of the model's peak.  "bandwidth": the controller's taken 5 % too high.
 
@@ -20,17 +20,22 @@ from asflown.estimate.jets.fit import jets
 from asflown.sim.flight.closed_loop import fly
 
 CLOSEST_S = 180.0
-TRUTH, WIDTH_RAD, PEAK, PEAK_S = np.array([0.55e-12, 10.3e-12, 8.5e-12]), 0.36, 6.48e-12, 39.3  # 004 Table 3
+TRUTH, WIDTH_RAD, PEAK, PEAK_S = np.array([0.55e-12, 10.3e-12, 8.5e-12]), 0.36, 6.48e-12, 39.3  # plume paper, Table 3
 
 
 def flight(seed: int):
     plume = {"shape": "plume", "closest_approach": f"{CLOSEST_S} s", "exponent": 1}
-    f = fly("quiet", craft="cassini", epoch="2008-03-12T19:03:12", duration="480 s", seed=seed, torques=[plume])
+    f = fly(
+        "quiet",
+        craft="cassini",
+        seed=seed,
+        changes={"epoch": "2008-03-12T19:03:12", "duration": "480 s", "torques": [plume]},
+    )
     return f.telemetry
 
 
 def of(result) -> tuple:
-    ends = [s.density_95 for s in result.sources] + [s.width_95 for s in result.sources]
+    ends = [s.density_ci95_kgm3 for s in result.sources] + [s.width_ci95_rad for s in result.sources]
     ends = np.array([[0.0 if a is None else a, np.inf if b is None else b] for a, b in ends])
     true = np.r_[TRUTH, np.full(3, WIDTH_RAD)]
     holds = (ends[:, 0] <= true) & (true <= ends[:, 1])

@@ -36,9 +36,9 @@ def quiet(flights: int) -> None:
     craft = load_craft("cassini", cm=(0, 0, 1.35))
     highest, theirs, worst = [], [], []
     for seed in range(flights):
-        r = leak(fly("leak", seed=1000 + seed, thruster_faults=[]).telemetry, craft)
+        r = leak(fly("leak", seed=1000 + seed, changes={"thruster_faults": []}).telemetry, craft)
         highest.append(r.statistic.max())
-        theirs.append(np.abs(r.monitor.gained).max() / np.sqrt(2) / r.noise_Nms.max())
+        theirs.append(np.abs(r.monitor.gained_Nms).max() / np.sqrt(2) / r.noise_Nms.max())
         worst.append(r.smallest_detectable_Nm)
     step_h = float(np.median(np.diff(r.time_s))) / 3600
     print(f"{flights} quiet hours: share with an alarm; smallest leak {1e6 * np.mean(worst):.1f} uN m in 600 s")
@@ -58,7 +58,7 @@ def stated(flights: int) -> None:
     for window in (60.0, 300.0, 600.0):
         sizes = []
         for seed in range(20):
-            f = fly("leak", seed=3000 + seed, duration=f"{ONSET_S + window} s", thruster_faults=[])
+            f = fly("leak", seed=3000 + seed, changes={"duration": f"{ONSET_S + window} s", "thruster_faults": []})
             smallest = leak(f.telemetry, craft, window_s=window).smallest_detectable_N
             if smallest:  # an alarm before has none
                 sizes.append(list(smallest.values()))
@@ -66,8 +66,14 @@ def stated(flights: int) -> None:
         for seed in range(flights):
             thruster, onset = THRUSTERS[seed % 8], ONSET_S + 0.125 * (seed * 7 % 64)
             size = np.mean(sizes, axis=0)[seed % 8]
-            f = fly("leak", seed=4000 + seed, duration=f"{onset + window + 32} s",
-                    thruster_faults=[{"thruster": thruster, "start": f"{onset} s", "leak": f"{1e3 * size} mN"}])  # fmt: skip
+            f = fly(
+                "leak",
+                seed=4000 + seed,
+                changes={
+                    "duration": f"{onset + window + 32} s",
+                    "thruster_faults": [{"thruster": thruster, "start": f"{onset} s", "leak": f"{1e3 * size} mN"}],
+                },
+            )
             r = leak(f.telemetry.between(None, onset + window), craft)
             late = leak(f.telemetry, craft)
             found.append(late.alarm and late.alarm_s <= onset + window)
@@ -87,8 +93,14 @@ def leaks(flights: int) -> None:
         for seed in range(flights):
             thruster = THRUSTERS[seed % 8]
             onset = ONSET_S + 0.125 * (seed * 7 % 64)
-            f = fly("leak", seed=5000 + seed, duration=f"{onset + WINDOW_S} s",
-                    thruster_faults=[{"thruster": thruster, "start": f"{onset} s", "leak": f"{size} mN"}])  # fmt: skip
+            f = fly(
+                "leak",
+                seed=5000 + seed,
+                changes={
+                    "duration": f"{onset + WINDOW_S} s",
+                    "thruster_faults": [{"thruster": thruster, "start": f"{onset} s", "leak": f"{size} mN"}],
+                },
+            )
             r = leak(f.telemetry, craft)
             hit = r.alarm and r.kind == "leak" and r.alarm_s >= onset
             found.append(bool(hit))
@@ -128,7 +140,7 @@ def weak(flights: int) -> None:
                 f = fly(
                     scenario,
                     seed=8000 + seed,
-                    thruster_faults=[{"thruster": thruster, "start": start, "factor": 1 - loss}],
+                    changes={"thruster_faults": [{"thruster": thruster, "start": start, "factor": 1 - loss}]},
                 )
                 use = f.scenario.thrusters
                 r = leak(f.telemetry, load_craft(name, cm=use.center_of_mass), thrust_N=use.thrust)

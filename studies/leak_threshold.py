@@ -4,7 +4,7 @@ Innovations are drawn, not flown: noise of every size gives the same law, as lon
 gains do not depend on data.  The rate an instant is -ln(1 - P)/N, P the share of records of N instants with an exceedance.
 
 Run: python studies/leak_threshold.py.   Answer, 2026-11: ln rate = ln(h)/2 - h within 0.1 for h from 6 to 10,
-from 1 to 16 s a step and 225 to 3600 instants, hence OFFSET and POWER in
+from 1 to 16 s a step and 225 to 3600 instants, hence _EXPONENT in
 estimate/leak/likelihood.py.
 """
 
@@ -16,6 +16,7 @@ from asflown.estimate.leak.known import Known
 from asflown.estimate.leak.likelihood import Monitor
 from asflown.estimate.leak.noise import Noise
 from asflown.estimate.leak.residual import Steps
+from asflown.kit.doubts import Doubts
 
 RECORDS = 1500
 LEVELS = np.arange(4.0, 11.1, 1.0)
@@ -35,7 +36,7 @@ def quiet_steps(count: int, step_s: float) -> Steps:
         guessed=none,
         unsure=np.zeros((count, 3, 3)),
         lost=np.zeros(count, bool),
-        doubts=(),
+        doubts=Doubts(),
     )
 
 

@@ -18,9 +18,8 @@ import sys
 
 import numpy as np
 
-from asflown import disturbance_torque
-from asflown import fly
-from asflown import load_craft
+import asflown
+from asflown import fly, load_craft
 from asflown.campaigns.truth import against_truth
 from asflown.estimate.torque import momentum as torque_momentum
 
@@ -29,7 +28,7 @@ WIDTHS = (10, 12, 14, 16, 18, 20, 24)
 
 def errors(flight, craft, **how):
     peaks = [(t, v) for t, v, _ in flight.truth.peaks]
-    result = disturbance_torque(flight.telemetry, craft, axis="y", **how)
+    result = asflown.torque(flight.telemetry, craft, axis="y", **how)
     return against_truth(result, flight.truth.time_s, flight.truth.torque_Nm[:, 1], peaks, "y")
 
 

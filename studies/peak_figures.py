@@ -24,8 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
-from asflown import load_craft
-from asflown import load_telemetry
+from asflown import load_craft, load_telemetry
 from asflown.kit.ensemble import spread
 from asflown.sim.mission.flown import fly_mission
 from asflown.trends.entries.actuation import torque_about_hinge

@@ -20,16 +20,10 @@ import numpy as np
 
 from asflown.craft.load import load_craft
 from asflown.dynamics.flyby import flyby_called
-from asflown.dynamics.plume import plume_density
-from asflown.dynamics.plume import published_jets
+from asflown.dynamics.plume import plume_density, published_jets
 from asflown.estimate.density.along_flyby import density
-from asflown.estimate.fused.series import ATTITUDE_ERROR
-from asflown.estimate.fused.series import BODY_RATE
-from asflown.estimate.fused.series import MOMENTUM
-from asflown.estimate.fused.series import channel_of
-from asflown.estimate.fused.series import step_of
-from asflown.estimate.fused.whitening import AxisData
-from asflown.estimate.fused.whitening import regression
+from asflown.estimate.fused.series import ATTITUDE_ERROR, BODY_RATE, MOMENTUM, channel_of, step_of
+from asflown.estimate.fused.whitening import AxisData, regression
 from asflown.kit.smoother import Measurements
 from asflown.sim.flight.closed_loop import fly
 
@@ -52,7 +46,16 @@ def flown(seed: int, folder: Path):
     path.write_text(
         "time [s],z [N m]\n" + "".join(f"{a},{b}\n" for a, b in zip(t, curve(t - CLOSEST_S, TRUE_S), strict=True))
     )
-    return fly("quiet", craft="cassini", epoch="2008-03-12T19:03:12", duration="480 s", seed=seed, torques=[{"shape": "table", "file": str(path)}])  # fmt: skip
+    return fly(
+        "quiet",
+        craft="cassini",
+        seed=seed,
+        changes={
+            "epoch": "2008-03-12T19:03:12",
+            "duration": "480 s",
+            "torques": [{"shape": "table", "file": str(path)}],
+        },
+    )
 
 
 def thinned(a: AxisData, rows: list[int], every: int, noisier: float, rng) -> AxisData:

@@ -55,9 +55,8 @@ from dataclasses import replace
 import numpy as np
 from scipy import signal
 
-from asflown import disturbance_torque
-from asflown import fly
-from asflown import load_craft
+import asflown
+from asflown import fly, load_craft
 from asflown.estimate.fused.peaks import PEAK_REACH_S
 from asflown.sim.scenario.scenario import load_scenario
 
@@ -125,13 +124,13 @@ def peaks_of(truth) -> list[tuple[float, float]]:
 def figures(shape: str, noise: str, seed: int) -> np.ndarray:
     """Of one flight's true peaks: error and sigma as shares, scale, and whether the interval holds without it and with it (peaks, 5)."""
     flight = fly(plan_of(shape, seed), seed=seed, noise=noise)
-    r = disturbance_torque(flight.telemetry, CRAFT, axis="y", method="fused")
+    r = asflown.torque(flight.telemetry, CRAFT, axis="y", method="fused")
     drawn = replace(r, settings={})
     rows = []
     for t, v in peaks_of(flight.truth):
         p = r.peak(t, PEAK_REACH_S, "y")
         holds = [x.peak(t, PEAK_REACH_S, "y").holds(v) for x in (drawn, r)]
-        rows.append((p.torque_Nm / v - 1, p.sigma_Nm / abs(v), r.peak_scale("y"), *holds))
+        rows.append((p.torque_Nm / v - 1, p.torque_sigma_Nm / abs(v), r.peak_scale("y"), *holds))
     return np.array(rows)
 
 

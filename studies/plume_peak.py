@@ -2,7 +2,7 @@
 
 Run: python studies/plume_peak.py [FLIGHTS]      (of each density; 40 take a quarter of an hour)
 
-Simulated flybys E3 on wheels, nominal noise: the jets of 004 Table 3 with the exponent 1 (a cusp where Cairo's axis is crossed) and
+Simulated flybys E3 on wheels, nominal noise: the jets of the plume paper's Table 3 with the exponent 1 (a cusp where Cairo's axis is crossed) and
 2 (a round top).  Methods as in ``asflown density`` and ``asflown jets`` (one common width, the exponent that was flown, the record until the simulator's
 jets fade); polynomials over -20 to +130 s as in 004.  The peak of the true curve is at +39.3 and +33.1 s.
 
@@ -37,9 +37,15 @@ FITS = {"jets, momentum": {"fit": "momentum", "method": "momentum"}, "jets, forw
 
 def flight(seed: int, exponent: int):
     return fly(
-        "quiet", craft="cassini", epoch="2008-03-12T19:03:12", duration="480 s", seed=seed,
-        torques=[{"shape": "plume", "closest_approach": f"{CLOSEST_S} s", "exponent": exponent}],
-    )  # fmt: skip
+        "quiet",
+        craft="cassini",
+        seed=seed,
+        changes={
+            "epoch": "2008-03-12T19:03:12",
+            "duration": "480 s",
+            "torques": [{"shape": "plume", "closest_approach": f"{CLOSEST_S} s", "exponent": exponent}],
+        },
+    )
 
 
 def row(time_s, rho, peak, at, f) -> tuple:
@@ -59,8 +65,8 @@ def of_density(f, craft, how) -> tuple:
     found = row(r.time_s, r.density_kgm3, p.density_kgm3, p.time_s, f)
     height = p.density_kgm3 / (1 + found[0] / 100)
     pulls = (
-        (p.density_kgm3 - height) / p.sigma_shape_kgm3 if p.sigma_shape_kgm3 else np.nan,
-        found[1] / (p.sigma_time_s or np.nan),
+        (p.density_kgm3 - height) / p.density_sigma_shape_kgm3 if p.density_sigma_shape_kgm3 else np.nan,
+        found[1] / (p.time_sigma_s or np.nan),
     )
     return *found, *pulls
 

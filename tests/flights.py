@@ -32,7 +32,7 @@ def flown(scenario: str, **changes) -> Flight:
 
 @lru_cache(maxsize=16)
 def _flown(scenario: str, changes: str) -> Flight:
-    flight = fly(scenario, **json.loads(changes))
+    flight = fly(scenario, changes=json.loads(changes))
     for c in flight.telemetry.channels.values():
         for column in (c.tai_ns, c.values, c.valid):
             column.flags.writeable = False
@@ -48,7 +48,7 @@ def past_e3(seed: int = 3, exponent: int = 2, **changes) -> Flight:
 def assert_refused(scenario: str, **changes) -> None:
     """``fly`` refuses it, in words: enough of them, and not too many."""
     with pytest.raises(BadInput) as why:
-        fly(scenario, **changes)
+        fly(scenario, changes=changes)
     assert 20 < len(str(why.value)) < 1400
 
 
@@ -97,6 +97,11 @@ def changed(tlm: Telemetry, name: str, change) -> Telemetry:
 def scaled(tlm: Telemetry, name: str, factor) -> Telemetry:
     """Values of this name or stem times a number, or times one for each sample."""
     return changed(tlm, name, lambda c: replace(c, values=factor * c.values))
+
+
+def conjugated(tlm: Telemetry) -> Telemetry:
+    """The attitude the other way round."""
+    return changed(tlm, "quaternion", lambda c: c if c.member == "w" else replace(c, values=-c.values))
 
 
 def with_values(tlm: Telemetry, name: str, values) -> Telemetry:

@@ -1,7 +1,9 @@
 """The pages against the code: names, keys and numbers that a reader may rely on."""
 
 import re
+import sys
 import tomllib
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -148,3 +150,65 @@ def test_every_picture_and_page_linked_is_there_and_small():
             assert path.is_file(), f"{file.name} links to {target}"
             if path.suffix in (".png", ".svg"):
                 assert path.stat().st_size < 150_000, target
+
+
+@pytest.mark.parametrize("name", ["doubts.md", "architecture.md", "cli.md"])
+def test_pages_made_from_the_program_are_current(name):
+    """On a failure: python docs/pages.py, and read the difference."""
+    sys.path.insert(0, str(DOCS))
+    try:
+        import pages
+    finally:
+        sys.path.remove(str(DOCS))
+    assert page(name) == pages.PAGES[name]()
+
+
+def test_the_walk_of_the_architecture_page_exists():
+    for module, name in re.findall(r"^\d+\. `([\w.]+)\.(\w+)`", page("architecture.md"), re.M):
+        assert hasattr(import_module(f"asflown.{module}"), name), f"{module}.{name}"
+
+
+def commands(group, words=()):
+    """Every command of the program: (words, command)."""
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from commands(command, (*words, name))
+        else:
+            yield (*words, name), command
+
+
+def test_every_option_is_documented():
+    """Each in its verb's section of docs/cli.md, or among the options that several verbs share."""
+    from typer.main import get_command
+
+    from asflown.cli.main import app
+
+    text = page("cli.md")
+    shared = text.split("\n## ")[0]
+    missing = [
+        (" ".join(words), option)
+        for words, command in commands(get_command(app))
+        for parameter in command.params
+        for option in parameter.opts
+        if option.startswith("--") and option not in ("--help", "--version")
+        and not re.search(rf"{option}\b", section(text, f"asflown {words[0]}") + shared)
+    ]  # fmt: skip
+    assert not missing
+
+
+@pytest.mark.parametrize(
+    "file", [Path("README.md"), *(p.relative_to(DOCS.parent) for p in sorted(DOCS.rglob("*.md")))], ids=str
+)
+def test_python_blocks_run(file, tmp_path, monkeypatch):
+    """In one namespace a page, in a folder with flight.csv, a simulated deployment."""
+    blocks = code_blocks((DOCS.parent / file).read_text(encoding="utf-8"), "python")
+    if not blocks:
+        pytest.skip("no Python on this page")
+    from asflown.telemetry.tables import write_table
+    from flights import flown
+
+    write_table(flown("cover-deploy").telemetry, tmp_path / "flight.csv")
+    monkeypatch.chdir(tmp_path)
+    names: dict = {}
+    for block in blocks:
+        exec(compile(block, str(file), "exec"), names)

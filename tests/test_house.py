@@ -195,3 +195,47 @@ def test_every_verb_is_documented():
     assert verbs == {
         line.removeprefix("## asflown ").strip() for line in page.splitlines() if line.startswith("## asflown ")
     }
+
+
+def words_that_decide(path: Path):
+    """Line numbers at which code looks for words in a doubt: `"…" in d`, `d.startswith(…)`, a pattern on `str(d)`."""
+
+    def is_doubt(node) -> bool:
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "str" and node.args:
+            return is_doubt(node.args[0])
+        return isinstance(node, ast.Name) and node.id in ("d", "doubt", "said", "sentence")
+
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Compare) and any(isinstance(o, ast.In | ast.NotIn) for o in node.ops):
+            if is_doubt(node.comparators[0]) or (
+                isinstance(node.left, ast.Constant)
+                and isinstance(node.left.value, str)
+                and "doubts" in ast.unparse(node.comparators[0])
+            ):
+                yield node.lineno
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            looks = node.func.attr in ("startswith", "endswith", "replace", "partition", "split", "find", "index")
+            searched = node.func.attr in ("sub", "search", "match", "fullmatch") and any(is_doubt(a) for a in node.args)
+            if (looks and is_doubt(node.func.value)) or searched:
+                yield node.lineno
+
+
+def test_no_code_decides_by_the_words_of_a_doubt():
+    found = [(str(p.relative_to(SRC)), line) for p in SRC.rglob("*.py") for line in words_that_decide(p)]
+    assert not found
+
+
+def test_every_kind_of_doubt_is_declared_where_it_is_found():
+    """A kind's id begins with the room, or the sub-package of estimate, that declares it; ids are unique by construction."""
+    wrong = []
+    for path in SRC.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Kind" and node.args:
+                if not isinstance(node.args[0], ast.Constant):
+                    continue
+                name = str(node.args[0].value)
+                parts = path.relative_to(SRC).parts
+                room = parts[1] if parts[0] == "estimate" else parts[0]
+                if path.name != "doubts.py" or parts[0] != "kit":
+                    wrong += [] if name.partition(".")[0] == room else [(str(path.relative_to(SRC)), name)]
+    assert not wrong

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from asflown.campaigns.budget import error_budget, of_rise, split_method
+from asflown.estimate.torque.reconstruct import THRUSTERS_FIRE
 from asflown.kit.errors import BadInput
 from flights import CASSINI
 
@@ -20,9 +21,9 @@ def test_rows_have_coverage_only_where_there_is_a_band_and_monte_carlo_errors():
     printed, momentum = error_budget("profile-1", CASSINI, ["momentum-printed", "momentum"], runs=4)
     assert printed.coverage_95 is None and printed.record()["coverage_95"] is None
     assert 0.8 < momentum.coverage_95.value <= 1 and momentum.coverage_68.value < momentum.coverage_95.value
-    assert 0 < momentum.rms_Nm.error < momentum.rms_Nm.value and len(momentum.peak_error_percent) == 6
+    assert 0 < momentum.rms_Nm.sigma < momentum.rms_Nm.value and len(momentum.peak_error_percent) == 6
     record = momentum.record()
-    assert {"method", "rms_Nm", "lag_s", "coverage_95", "peak_error_percent", "rms_Nm_mc"} <= set(record)
+    assert {"method", "rms_Nm", "lag_s", "coverage_95", "peak_error_percent", "rms_sigma_Nm"} <= set(record)
 
 
 def test_a_long_sweep_still_holds_all_pulses():
@@ -32,9 +33,23 @@ def test_a_long_sweep_still_holds_all_pulses():
 
 def test_a_budget_passes_on_what_its_results_doubt():
     """e5 is held by thrusters, whose torque counts as the surroundings': every flight's result says so."""
-    (row,) = error_budget("e5", CASSINI, ["momentum"], runs=2)
-    assert any("thrusters fire in this record" in d for d in row.doubts)
-    assert all(d.endswith("of 2 flights)") for d in row.doubts)
+    budget = error_budget("e5", CASSINI, ["momentum"], runs=2)
+    (row,) = budget
+    assert row.doubts.has(THRUSTERS_FIRE)
+    assert len(budget.doubts) == len(row.doubts) and all(d.numbers["runs"] == 2 for d in budget.doubts)
+    told = budget.doubts.about(kind=THRUSTERS_FIRE.id)  # one for each set of thrusters
+    assert sum(d.numbers["flights"] for d in told) == 2 and str(told[0]).endswith("of 2 flights)")
+    assert {d.severity for d in told} == {THRUSTERS_FIRE.severity}
+
+
+def test_a_sweep_has_a_row_for_each_rise_and_keeps_old_keys():
+    budget = error_budget("profile-1", CASSINI, ["momentum-printed"], runs=2, noise="none", rises_s=[15.0, 30.0])
+    assert [r.rise_s for r in budget] == [15.0, 30.0] and len(budget._tables()) == 4
+    for row in budget.record()["rows"]:
+        assert (
+            row["rms_Nm_mc"] == row["rms_sigma_Nm"] and row["peak_error_percent_mc"] == row["peak_error_sigma_percent"]
+        )
+    assert budget.options["runs"] == 2 and budget.options["scenario"] == "profile-1" and budget.seed == 0
 
 
 def test_what_cannot_be_budgeted_is_refused():
@@ -55,12 +70,13 @@ def test_recovery_fused_over_noise_levels():
     ratios = []
     for profile in ("profile-1", "profile-2"):
         for noise in ("half", "nominal", "double"):
-            rows = error_budget(
+            budget = error_budget(
                 profile, CASSINI, ["momentum-printed", "transfer-printed", "fused"], runs=12, noise=noise
             )
-            momentum, transfer, fused = (r.rms_Nm.value for r in rows)
+            momentum, transfer, fused = (r.rms_Nm.value for r in budget)
             ratios.append((momentum / fused, transfer / fused))
-            assert rows[2].failed == 0 and abs(rows[2].lag_s.value) < 0.3
-            assert rows[2].coverage_95.value > 0.92 and rows[2].corner_coverage_95.value > 0.75
+            by_fused = budget.rows[2]
+            assert by_fused.failed == 0 and abs(by_fused.lag_s.value) < 0.3
+            assert by_fused.coverage_95.value > 0.92 and by_fused.corner_coverage_95.value > 0.75
     best = np.exp(np.mean(np.log(ratios), axis=0))
     assert best[0] > 4 and best[1] > 2.4

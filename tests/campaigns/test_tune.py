@@ -2,7 +2,7 @@
 
 import pytest
 
-from asflown.campaigns.tune import remarks, tune
+from asflown.campaigns.tune import PAPER_CHOSE_ANOTHER, TWO_ERRORS_BALANCE, tune
 from asflown.kit.errors import BadInput
 from flights import CASSINI
 
@@ -30,10 +30,12 @@ def test_impossible_spans_are_refused():
 
 def test_published_choice_is_not_the_least_error_and_the_search_says_so():
     """000 settled on 8 % for a small error "without overly damping": the least error is at 10 %."""
-    rows = tune(CASSINI, spans=[0.04, 0.08, 0.10])
-    assert min(rows, key=lambda r: r.worst_percent).span == 0.10
-    assert any("settled on 8 %, not on 10 %" in d for d in remarks(rows))
-    assert not any("settled" in d for d in remarks(rows[:2]))
+    search = tune(CASSINI, spans=[0.04, 0.08, 0.10])
+    assert search.best.span == 0.10 and search.record()["best_span"] == 0.10
+    assert search.doubts.of(PAPER_CHOSE_ANOTHER)[0].numbers["best_percent"] == pytest.approx(10)
+    without = tune(CASSINI, spans=[0.04, 0.08])
+    assert without.best.span == 0.08 and without.doubts.has(TWO_ERRORS_BALANCE)
+    assert not without.doubts.has(PAPER_CHOSE_ANOTHER)
 
 
 @pytest.mark.parametrize("rise", [0.0, -5.0, float("nan")])

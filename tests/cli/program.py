@@ -52,7 +52,11 @@ def complaint(*words) -> str:
     """The one error message of a run that must be refused."""
     done = run(*words)
     assert done.code == 2, (done.code, done.err[:600], done.out[:200])
-    assert done.out == ""
+    if "--json" in words:
+        told = strict_json(done.out)
+        assert told["exit_code"] == 2 and told["error"]["what"] and told["error"]["remedy"]
+    else:
+        assert done.out == ""
     assert done.err.startswith("error: ") and done.err.count("error: ") == 1
     assert len(done.err) < 1500
     assert len(done.err.splitlines()) >= 2, f"no remedy: {done.err}"

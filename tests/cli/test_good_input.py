@@ -59,7 +59,7 @@ def test_one_json_object_with_the_promised_keys(options, good):
     torque_y = finite(record["torque_Nm"])
     assert torque_y.shape == finite(record["time_s"]).shape and np.isfinite(torque_y).all()
     assert record["sigma_Nm"] is None or finite(record["sigma_Nm"]).shape == torque_y.shape
-    with_sigma = {"sigma_Nm", "interval_95_Nm"} if options[1] == "fused" else set()
+    with_sigma = {"torque_sigma_Nm", "torque_ci95_Nm", "sigma_Nm", "interval_95_Nm"} if options[1] == "fused" else set()
     assert all(set(p) == {"time_s", "torque_Nm"} | with_sigma for p in record["peaks"])
     largest = max(record["peaks"], key=lambda p: abs(p["torque_Nm"]))
     assert largest["torque_Nm"] > 0 and abs(largest["time_s"] - 240) < 10  # s

@@ -5,16 +5,18 @@ import sys
 import numpy as np
 import pytest
 
+import asflown
 from asflown.craft.load import load_craft
 from asflown.dynamics.momentum import wheel_momentum
 from asflown.estimate.fused.free_body import FreeBody
 from asflown.estimate.fused.gather import gather
 from asflown.estimate.fused.held_back import APART, blocks, hold_back
+from asflown.estimate.fused.innovations import KNOWN_OFF
 from asflown.estimate.fused.levels import OUTLYING
 from asflown.estimate.fused.series import BODY_RATE, MOMENTUM
-from asflown.estimate.subject.subject import subject_of
-from asflown.estimate.torque.reconstruct import disturbance_torque
-from asflown.estimate.torque.table import save_csv
+from asflown.estimate.subject import PER_SPIN_INERTIA, subject_of
+from asflown.estimate.subject.actuation import COMMANDED_ONLY
+from asflown.estimate.subject.grid import GAPS_NULL
 from asflown.telemetry.screening import gaps
 from conftest import ROOT
 from flights import inspiresat1, iss
@@ -30,15 +32,14 @@ def wheels_and_body(telemetry):
 
 @pytest.mark.parametrize("method", ["momentum", "fused"])
 def test_inspiresat1_torque_is_per_spin_inertia_and_says_so(tmp_path, method):
-    result = disturbance_torque(inspiresat1(), load_craft("inspiresat1"), method=method)
+    result = asflown.torque(inspiresat1(), load_craft("inspiresat1"), method=method)
     assert result.relative and np.isfinite(result.torque_Nm).all()
     record = result.record()
     assert record["torque_Nm"] is None and record["sigma_Nm"] is None and record["momentum_Nms"] is None
     assert len(record["torque_per_spin_inertia_rad_s2"]) == len(record["time_s"]) == 476
-    assert any("per unit spin inertia" in d for d in result.doubts)
-    assert "N m" not in str(result).replace("not N m", "")
-    origin = {"inputs": [], "versions": {"asflown": "0"}, "options": {}}
-    save_csv(result, tmp_path / "torque.csv", origin)
+    assert result.doubts.has(PER_SPIN_INERTIA)
+    assert "N m" not in str(result)
+    result.save(tmp_path / "torque.csv")
     header = next(x for x in (tmp_path / "torque.csv").read_text().splitlines() if not x.startswith("#"))
     assert "disturbance_torque_per_spin_inertia_x [rad/s2]" in header and "N m" not in header
 
@@ -103,7 +104,7 @@ def test_recovery_iss_stored_momentum_is_the_reported_one():
 
 def test_iss_torque_is_null_in_gaps_and_only_there():
     telemetry = iss()
-    result = disturbance_torque(telemetry, load_craft("iss"), method="momentum")
+    result = asflown.torque(telemetry, load_craft("iss"), method="momentum")
     known = np.isfinite(result.torque_Nm).all(axis=1)
     missing = np.zeros(len(known), bool)
     for name in [f"control_torque_{a}" for a in "xyz"] + [f"body_rate_{a}" for a in "xyz"]:
@@ -115,14 +116,14 @@ def test_iss_torque_is_null_in_gaps_and_only_there():
     assert not known[missing].any()
     # besides the gaps only what stands alone between two of them, too short for the window, may be null
     assert np.mean(known[~missing]) > 0.98
-    assert any("gaps" in d for d in result.doubts) and any("commanded control torque" in d for d in result.doubts)
+    assert result.doubts.has(GAPS_NULL) and result.doubts.has(COMMANDED_ONLY)
 
 
 def test_iss_torque_about_x_follows_the_gravity_gradient():
     import iss_stored_momentum as study
 
     telemetry, craft = iss().between(4360, 10010), load_craft("iss")  # one orbit
-    result = disturbance_torque(telemetry, craft, method="momentum", window_s=300.0)
+    result = asflown.torque(telemetry, craft, method="momentum", window_s=300.0)
     at, gravity = study.pull_of_gravity(telemetry, craft.at(telemetry.epoch_ns).inertia_kgm2)
     known = np.isfinite(result.torque_Nm[:, 0])
     expected = np.interp(result.time_s[known], at, gravity[:, 0])
@@ -136,12 +137,12 @@ def test_recovery_iss_fused_torque_about_x_follows_the_gravity_gradient():
     import iss_stored_momentum as study
 
     telemetry, craft = iss().between(4728, 7128), load_craft("iss")
-    result = disturbance_torque(telemetry, craft, method="fused", prior="matern")
+    result = asflown.torque(telemetry, craft, method="fused", prior="matern")
     at, gravity = study.pull_of_gravity(telemetry, craft.at(telemetry.epoch_ns).inertia_kgm2)
     expected = np.interp(result.time_s, at, gravity[:, 0])
     assert np.corrcoef(result.torque_Nm[:, 0], expected)[0, 1] > 0.8
     assert abs(np.mean(result.torque_Nm[:, 0] - expected)) < 1.5  # N m, of 3
-    assert not any("off what was given" in d for d in result.doubts)
+    assert not result.doubts.has(KNOWN_OFF)
 
 
 @pytest.mark.parametrize("axis", "xyz")

@@ -5,8 +5,9 @@ import pytest
 from scipy import integrate, stats
 
 from asflown.kit.errors import BadInput
-from asflown.maneuvers.history import MAIN_ENGINE, RCS, history, past_model
-from asflown.maneuvers.model import pointing_density
+from asflown.maneuvers import history
+from asflown.maneuvers.history import MAIN_ENGINE, RCS, gates_history, past_model, past_models
+from asflown.maneuvers.model import POINTING_BELOW_BIASES, pointing_density
 
 #: 002 Table 2: per cent, mm/s, mrad, mm/s.
 TABLE_2 = {
@@ -45,7 +46,7 @@ def test_published_models_and_biases(engine):
         (fx, fy), (px, py) = g.pointing_bias_fixed_mps, g.pointing_bias_proportional_rad
         found = np.array([100 * g.bias_proportional, 1e3 * g.bias_fixed_mps, 1e3 * px, 1e3 * fx, 1e3 * py, 1e3 * fy])
         assert found == pytest.approx(np.array(row), abs=1e-9)
-    assert {n for m in history() if m.engine == engine for n in m.names} == set(TABLE_2[engine])
+    assert {n for m in past_models() if m.engine == engine for n in m.names} == set(TABLE_2[engine])
 
 
 def test_published_counts_ranges_and_removals():
@@ -70,7 +71,8 @@ def test_published_rms_floor_of_rcs_pointing_is_said_in_words():
     rcs, me = past_model("rcs/2012-1"), past_model("main/2012-1")
     floor = 1e3 * rcs.model.pointing_floor_mps(np.array([0.05, 0.1, 0.3])) / [0.05, 0.1, 0.3]
     assert floor == pytest.approx([4.82, 5.81, 6.48], abs=0.005)  # mrad, where the model says 4.5
-    assert any("cannot hold for large burns" in d and "6.48 mrad" in d for d in rcs.doubts)
+    (low,) = rcs.doubts.of(POINTING_BELOW_BIASES)
+    assert low.numbers["floor_mrad"] == pytest.approx(6.48, abs=0.005)
     assert 1e3 * me.model.pointing_floor_mps(13.0) == pytest.approx(10.98, abs=0.005)
     assert me.model.contradiction() is None
 
@@ -94,9 +96,9 @@ def test_published_normaliser_of_the_pointing_density(variant, whole):
 
 
 def test_published_doubts_of_the_tables_are_kept():
-    assert any("+3 %" in d for d in past_model("rcs/2006-01").doubts)
-    assert any("limit, not an estimate" in d for d in past_model("main/2008-01").doubts)
-    assert any("325" in d for d in past_model("rcs/2012-1").doubts)
+    assert past_model("rcs/2006-01").doubts.has(history.BIAS_SIGN)
+    assert past_model("main/2008-01").doubts.has(history.SIGMA_IS_LIMIT)
+    assert past_model("rcs/2012-1").doubts.has(history.BURNS_UNSURE)
 
 
 def test_a_model_is_found_by_engine_or_by_its_whole_name():
@@ -109,7 +111,16 @@ def test_a_model_is_found_by_engine_or_by_its_whole_name():
 
 
 def test_every_past_model_has_a_record():
-    for m in history():
+    for m in past_models():
         record = m.record()
         assert record["names"] and record["magnitude"]["fixed_mps"] == m.model.magnitude_fixed_mps
         assert (record["magnitude"]["bias_fixed_mps"] is None) == (not m.bias_known)
+
+
+def test_the_history_of_one_engine():
+    models = gates_history(engine="MEA").models
+    assert [m.engine for m in models] == [MAIN_ENGINE] * 6
+    whole = gates_history()
+    assert str(whole).count("main-engine 2012-1") == 2 and whole.doubts.has(history.BIAS_SIGN)
+    with pytest.raises(BadInput, match="holds no engine"):
+        gates_history(engine="ion")

@@ -9,7 +9,8 @@ from asflown.dynamics.flyby import flyby_called
 from asflown.estimate.density.along_flyby import density
 from asflown.estimate.jets.fit import jets
 from asflown.plots.figure import new_figure, save_figures
-from asflown.plots.flyby import draw_from_pole, draw_geometry, flyby_figures
+from asflown.plots.flyby import flyby_figures
+from asflown.plots.flyby_geometry import draw_from_pole, draw_geometry
 from cli.program import complaint, run
 from flights import CASSINI, flown
 
@@ -25,7 +26,7 @@ def met(scenario="e3", closest_s=180.0, **how):
 def test_the_set_is_whole(tmp_path):
     telemetry, result = met()
     fitted = jets(telemetry, CASSINI, "E3", 180.0, widths="common", method="momentum")
-    figures = flyby_figures(result, telemetry, CASSINI, fitted)
+    figures = flyby_figures(result, telemetry, fitted)
     assert set(figures) == ALWAYS | {"geometry", "geometry-pole", "components", "model"}
     for path in save_figures(figures, tmp_path):
         text = path.read_text()
@@ -37,7 +38,7 @@ def test_the_set_is_whole(tmp_path):
 
 def test_without_a_latitude_there_is_no_geometry():
     telemetry, result = met("titan", 420.0)
-    figures = flyby_figures(result, telemetry, CASSINI)
+    figures = flyby_figures(result, telemetry)
     assert set(figures) == ALWAYS
     assert figures["density"].axes[0].get_xlim()[1] == pytest.approx(269.2, abs=0.1)  # s: six scale heights up
 

@@ -5,8 +5,7 @@ import re
 
 import pytest
 
-from asflown.estimate.gates.fit import fit_gates
-from asflown.estimate.gates.judge import judge_gates
+from asflown.estimate.gates import gates, gates_judgement
 from asflown.maneuvers.history import past_model
 from asflown.report.gates_page import write_gates_report
 from asflown.sim.maneuver_sets import RCS_SET, a_branch, execute
@@ -18,14 +17,9 @@ RCS = past_model("rcs/2008-01").model
     "burns, verdict", [(a_branch(RCS, 0.15, 1), "ALARM"), (execute(RCS, RCS_SET, 1).take(range(5)), "WATCH")]
 )
 def test_law_verdict_first_nothing_fetched_ids_their_own(burns, verdict, tmp_path):
-    fit = fit_gates(burns)
-    judged = judge_gates(fit, draws=20)
-    record = (
-        fit.record()
-        | judged.record()
-        | {"doubts": ["a & <b>"], "provenance": {"inputs": [], "versions": {}, "options": {}}}
-    )
-    twin = write_gates_report(fit, judged, None, record, tmp_path / "page.html")
+    fit = gates(burns)
+    result = fit.with_judgement(gates_judgement(fit, draws=20)).with_doubts("a & <b>")
+    twin = write_gates_report(result, tmp_path / "page.html")
     text = (tmp_path / "page.html").read_text()
     body = text[text.index("<body>") :]
     assert body.index(verdict) < body.index("Model and judgement") < body.index("<svg")

@@ -34,12 +34,12 @@ def drift_of_momentum(flight) -> float:
     ],
 )
 def test_law_momentum_is_conserved_in_inertial_space_without_external_torque(scenario, changes):
-    assert drift_of_momentum(fly(scenario, **changes)) < 1e-10
+    assert drift_of_momentum(fly(scenario, changes=changes)) < 1e-10
 
 
 def test_law_momentum_grows_by_the_impulse_of_the_torque():
     push = [{"shape": "table", "axis": "x", "times": "10 20 40 s", "torques": "0 0.02 0 N m"}]
-    H = fly("quiet", duration="60 s", torques=push).truth.momentum_inertial_Nms
+    H = fly("quiet", changes={"duration": "60 s", "torques": push}).truth.momentum_inertial_Nms
     # the attitude turns by some 1e-4 rad meanwhile, and body axes with it
     assert H[-1] - H[0] == pytest.approx([0.3, 0, 0], abs=1e-4)
 
@@ -63,9 +63,18 @@ def energy(flight, plant_craft) -> np.ndarray:
 def test_law_energy_balances():
     push = [{"shape": "triangles", "axis": "x", "peak": "0.5 N m", "rise": "3 s", "first": "2 s", "count": 4}]
     flight = fly(
-        "slews", duration="300 s", settle="0 s", noise="none", torques=push, substeps=8,
-        flexible=True, friction=True, controller={"friction_compensation": True},
-    )  # fmt: skip
+        "slews",
+        noise="none",
+        changes={
+            "duration": "300 s",
+            "settle": "0 s",
+            "torques": push,
+            "substeps": 8,
+            "flexible": True,
+            "friction": True,
+            "controller": {"friction_compensation": True},
+        },
+    )
     E = energy(flight, flight.craft)
     by_torque, by_motors, in_bearings, in_modes = flight.truth.ledger_J.T
     exchanged = np.abs(by_torque).max() + np.abs(by_motors).max()
@@ -123,13 +132,13 @@ def test_law_energy_balances_with_a_heavy_mode():
 
 
 def test_law_the_step_does_not_matter():
-    coarse, fine = (fly("profile-2", noise="none", flexible=True, substeps=n).truth for n in (4, 16))
+    coarse, fine = (fly("profile-2", noise="none", changes={"flexible": True, "substeps": n}).truth for n in (4, 16))
     difference = np.abs(coarse.body_rate_rad_s - fine.body_rate_rad_s).max()
     assert difference < 1e-5 * np.abs(fine.body_rate_rad_s).max()
 
 
 def test_law_same_seed_same_numbers_other_seed_other_numbers():
-    a, b, c = (fly("profile-1", duration="60 s", seed=s).telemetry for s in (5, 5, 6))
+    a, b, c = (fly("profile-1", seed=s, changes={"duration": "60 s"}).telemetry for s in (5, 5, 6))
     for name in a.channels:
         assert np.array_equal(a.channels[name].values, b.channels[name].values)
     assert not np.array_equal(a.channels["body_rate_y"].values, c.channels["body_rate_y"].values)
@@ -138,8 +147,8 @@ def test_law_same_seed_same_numbers_other_seed_other_numbers():
 SHORT = """
 import numpy as np
 from asflown.sim.flight import fly
-f = fly("cover-deploy", duration="6 s", settle="0 s", flexible=True, friction=True, noise="nominal",
-        cover={"times": "1 3 5 s", "rates": "0 73.225 0 deg/s", "motor_on": "1 s", "stall": "5 s"})
+f = fly("cover-deploy", noise="nominal", changes={"duration": "6 s", "settle": "0 s", "flexible": True, "friction": True,
+        "cover": {"times": "1 3 5 s", "rates": "0 73.225 0 deg/s", "motor_on": "1 s", "stall": "5 s"}})
 np.save("OUT", np.hstack([f.truth.body_rate_rad_s, f.truth.wheel_rate_rad_s, f.truth.attitude]))
 """
 
@@ -148,7 +157,8 @@ WITH_THRUSTERS = """
 import numpy as np
 from asflown.sim.flight import fly
 bias = [{"start": "0 s", "stop": "2 s", "rates": {"RWA1": "30 rpm", "RWA4": "30 rpm"}}]
-f = fly("wheel-bias-fsds", duration="6 s", wheel_biases=bias, thrusters={"deadband": "30 30 30 urad", "catalyst_beds": {}})
+f = fly("wheel-bias-fsds", changes={"duration": "6 s", "wheel_biases": bias,
+        "thrusters": {"deadband": "30 30 30 urad", "catalyst_beds": {}}})
 assert f.truth.thrusters.pulses[-1].sum() > 3
 np.save("OUT", np.hstack([f.truth.body_rate_rad_s, f.truth.wheel_rate_rad_s, f.truth.attitude]))
 """

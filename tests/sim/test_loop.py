@@ -36,9 +36,18 @@ def simulated_response(f_Hz: float, **controller) -> complex:
         "torques": " ".join(f"{v:.12e}" for v in torque) + " N m",
     }]  # fmt: skip
     truth_flight = fly(
-        "quiet", craft=load_craft("cassini", **DIAGONAL), noise="none", settle="0 s", wheel_rates={},
-        duration=f"{first + length} s", torques=torques, controller=controller, telemetry={"attitude_error": "0.125 s"},
-    )  # fmt: skip
+        "quiet",
+        craft=load_craft("cassini", **DIAGONAL),
+        noise="none",
+        changes={
+            "settle": "0 s",
+            "wheel_rates": {},
+            "duration": f"{first + length} s",
+            "torques": torques,
+            "controller": controller,
+            "telemetry": {"attitude_error": "0.125 s"},
+        },
+    )
     c = truth_flight.telemetry.channel("attitude_error_y")
     s = truth_flight.telemetry.seconds(c.tai_ns)
     keep = (s >= first) & (s < first + length)
@@ -91,8 +100,7 @@ def published():
     """000 section VI on one axis: Iyy without the cover, wheels at rest."""
     craft = load_craft("cassini", **DIAGONAL)
     return {
-        n: fly(f"profile-{n}", craft=craft, noise="none", wheel_rates={name: "0 rpm" for name in ("RWA1", "RWA2", "RWA4")},
-               telemetry={"attitude_error": "0.125 s"})
+        n: fly(f"profile-{n}", craft=craft, noise="none", changes={"wheel_rates": {name: "0 rpm" for name in ("RWA1", "RWA2", "RWA4")}, "telemetry": {"attitude_error": "0.125 s"}})
         for n in (1, 2)
     }  # fmt: skip
 
@@ -131,8 +139,12 @@ def test_published_injected_peaks(published):
 def test_law_a_delay_and_a_wrong_inertia_change_the_loop(published):
     craft = load_craft("cassini", **DIAGONAL)
     right = fly("profile-1", craft=craft, noise="none").truth.control_torque_Nm[:, 1]
-    late = fly("profile-1", craft=craft, noise="none", controller={"delay_cycles": 1}).truth.control_torque_Nm[:, 1]
-    stiff = fly("profile-1", craft=craft, noise="none", controller={"inertia": "13020 10452 7038 0 0 0 kg m2"})
+    late = fly(
+        "profile-1", craft=craft, noise="none", changes={"controller": {"delay_cycles": 1}}
+    ).truth.control_torque_Nm[:, 1]
+    stiff = fly(
+        "profile-1", craft=craft, noise="none", changes={"controller": {"inertia": "13020 10452 7038 0 0 0 kg m2"}}
+    )
     assert 0 < np.abs(late - right).max() < 0.1 * np.abs(right).max()
     e = [np.abs(f.telemetry.channel("attitude_error_y").values).max() for f in (published[1], stiff)]
     # believed twice as large, the loop is twice as stiff at low frequency
@@ -142,9 +154,9 @@ def test_law_a_delay_and_a_wrong_inertia_change_the_loop(published):
 def test_law_friction_is_compensated_and_estimated():
     """Wheel 4 passes through rest under profile 1: compensation keeps the pointing, its estimate is the drag."""
     slow = {"wheel_rates": {"RWA1": "60 rpm", "RWA2": "-45 rpm", "RWA4": "4 rpm"}, "noise": "none", "friction": True}
-    without = fly("profile-1", **slow)
-    with_it = fly("profile-1", controller={"friction_compensation": True}, **slow)
-    clean = fly("profile-1", **(slow | {"friction": False}))
+    without = fly("profile-1", changes=slow)
+    with_it = fly("profile-1", changes={"controller": {"friction_compensation": True}, **slow})
+    clean = fly("profile-1", changes=slow | {"friction": False})
     worst = [np.abs(f.truth.body_rate_rad_s - clean.truth.body_rate_rad_s).max() for f in (without, with_it)]
     assert worst[1] < 0.5 * worst[0]
     drag = with_it.telemetry.channel("wheel_drag_torque_RWA1").values
@@ -154,13 +166,13 @@ def test_law_friction_is_compensated_and_estimated():
 
 def test_law_a_wheel_at_its_rate_limit_ends_the_flight():
     push = [{"shape": "constant", "torque": "0 0.05 0 N m"}]
-    flight = fly("quiet", noise="none", settle="0 s", torques=push, wheel_rates={"RWA1": "2015 rpm"})
+    flight = fly("quiet", noise="none", changes={"settle": "0 s", "torques": push, "wheel_rates": {"RWA1": "2015 rpm"}})
     assert flight.ended.startswith("wheel RWA1 at its rate limit at ")
     assert flight.truth.time_s[-1] < 60
 
 
 def test_law_slews_are_followed():
-    flight = fly("slews", noise="none", duration="1180 s")
+    flight = fly("slews", noise="none", changes={"duration": "1180 s"})
     e = flight.telemetry.channel("attitude_error_x").values
     # 4 zf / wf = 0.684 s of filter delay leaves e = 0.684 a / KP = 60 microrad while accelerating
     assert 1e6 * np.abs(e).max() < 90

@@ -17,6 +17,7 @@ from asflown.sim.mission.flown import fly_mission, line_at, plan_mission
 from asflown.sim.mission.mission import is_mission, load_mission, shipped_missions
 from asflown.sim.scenario.scenario import load_scenario
 from asflown.trends.entries.events import load_events
+from cli.program import run
 from flights import CASSINI
 
 SHIPPED = Path(mission.__file__).parents[1] / "missions" / "cassini-mission.toml"
@@ -268,24 +269,18 @@ def test_missions_are_told_from_scenarios(mission, tmp_path):
 
 
 def test_the_command_flies_a_mission(mission, tmp_path):
-    import typer
-    from typer.testing import CliRunner
-
-    from asflown.cli.simulate import simulate
-
     text = SHIPPED.read_text()
     head, *events = text.split("[[events]]\n")
     kept = [
         e if "2015-09-29" in e else e.replace('"\nnote', '"\nflown = false\nnote') for e in events if "flown" not in e
     ]
     (tmp_path / "mine.toml").write_text("[[events]]\n".join([head, *kept]))
-    app = typer.Typer()
-    app.command()(simulate)
-    out = tmp_path / "out"
-    done = CliRunner().invoke(app, [str(tmp_path / "mine.toml"), "--out", str(out), "--seed", "5", "--json"])
-    assert done.exit_code == 0, done.output
-    said = json.loads(done.stdout)
-    assert set(said) == {"command", "mission", "events", "flown", "listed", "truth", "seed", "doubts", "provenance"}
+    done = run("simulate", tmp_path / "mine.toml", "--out", tmp_path / "out", "--seed", "5", "--json")
+    assert done.code == 0, done.err
+    said = done.record
+    assert set(said) == {
+        "command", "mission", "events", "flown", "listed", "truth", "seed", "doubts", "doubts_detail", "provenance",
+    }  # fmt: skip
     assert (said["command"], said["mission"], said["flown"], said["listed"], said["seed"]) == (
         "simulate",
         "mine",

@@ -4,12 +4,12 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from asflown.kit.errors import BadInput
 from asflown.sim.flight.closed_loop import fly, write_flight
 from asflown.sim.flight.command import commanded_motion, slew_time
 from asflown.sim.scenario.scenario import load_scenario, shipped_scenarios
+from cli.program import run
 from flights import assert_refused
 
 
@@ -87,8 +87,15 @@ def test_law_commanded_motion_is_consistent():
 
 
 def test_law_the_plume_takes_momentum_away():
-    flight = fly("quiet", epoch="2008-03-12T19:00:00", duration="300 s", noise="none",
-                 torques=[{"shape": "plume", "closest_approach": "60 s"}])  # fmt: skip
+    flight = fly(
+        "quiet",
+        noise="none",
+        changes={
+            "epoch": "2008-03-12T19:00:00",
+            "duration": "300 s",
+            "torques": [{"shape": "plume", "closest_approach": "60 s"}],
+        },
+    )
     H = flight.truth.momentum_inertial_Nms
     impulse = np.trapezoid(flight.truth.torque_Nm[:, 2], flight.truth.time_s)
     assert impulse < -0.5
@@ -155,15 +162,9 @@ def test_files_hold_the_flight(tmp_path):
 
 
 def test_the_command_writes_and_reports(tmp_path):
-    import typer
-
-    from asflown.cli.simulate import simulate
-
-    app = typer.Typer()
-    app.command()(simulate)
-    done = CliRunner().invoke(app, ["quiet", "--out", str(tmp_path), "--noise", "half", "--json"])
-    assert done.exit_code == 0
-    said = json.loads(done.stdout)
+    done = run("simulate", "quiet", "--out", tmp_path, "--noise", "half", "--json")
+    assert done.code == 0
+    said = done.record
     assert said["command"] == "simulate" and said["ended"] == "reached 480 s" and said["seed"] == 1
     assert all((tmp_path / n).is_file() for n in ("telemetry.csv", "truth.csv", "truth.json"))
 
@@ -171,7 +172,11 @@ def test_the_command_writes_and_reports(tmp_path):
 def test_law_a_wheel_without_motor_coasts_as_its_bearing_has_it_and_the_attitude_is_held():
     """Against the law of Coulomb and viscous drag in closed form; the other wheels stay in the loop."""
     coasts = [{"wheel": "RWA1", "start": "60 s", "stop": "360 s"}]
-    flight = fly("quiet", noise="none", friction=True, controller={"friction_compensation": True}, coasts=coasts)
+    flight = fly(
+        "quiet",
+        noise="none",
+        changes={"friction": True, "controller": {"friction_compensation": True}, "coasts": coasts},
+    )
     t, truth = flight.truth.time_s, flight.truth
     coasting = (t >= 60) & (t < 360)
     assert np.all(truth.motor_torque_Nm[coasting, 0] == 0) and np.all(truth.motor_torque_Nm[:, 1:] != 0)
@@ -190,7 +195,7 @@ def test_law_a_wheel_without_motor_coasts_as_its_bearing_has_it_and_the_attitude
 
 def test_law_momentum_grows_by_the_impulse_from_outside():
     coasts = [{"wheel": "RWA1", "start": "60 s", "stop": "360 s"}]
-    truth = fly("quiet", noise="none", friction=True, coasts=coasts, drag_spikes=SPIKES).truth
+    truth = fly("quiet", noise="none", changes={"friction": True, "coasts": coasts, "drag_spikes": SPIKES}).truth
     gained = truth.momentum_inertial_Nms[-1] - truth.momentum_inertial_Nms[0]
     impulse = truth.holding_torque_Nm[:-1].sum(axis=0) * 0.125
     assert gained == pytest.approx(impulse, abs=2e-4 * np.abs(impulse).max()) and np.abs(impulse).max() > 0.5
@@ -201,10 +206,10 @@ SPIKES = [{"wheel": "RWA4", "start": "100 s", "duration": "50 s", "torque": "0.0
 
 
 def test_law_drag_spikes_only_move_momentum_between_wheel_and_body():
-    flight = fly("quiet", friction=True, noise="none", drag_spikes=SPIKES)
+    flight = fly("quiet", noise="none", changes={"friction": True, "drag_spikes": SPIKES})
     H = flight.truth.momentum_inertial_Nms
     assert np.abs(H - H[0]).max() < 1e-10 * np.linalg.norm(H[0])
-    plain = fly("quiet", friction=True, noise="none").truth
+    plain = fly("quiet", noise="none", changes={"friction": True}).truth
     lost = (plain.wheel_rate_rad_s - flight.truth.wheel_rate_rad_s)[:, 2] * 0.16138
     at = np.searchsorted(flight.truth.time_s, [99.0, 101.5])
     assert abs(lost[at[0]]) < 1e-12 and lost[at[1]] == pytest.approx(0.01, rel=0.05)  # 1 s at 0.01 N m
@@ -214,7 +219,7 @@ def test_law_drag_spikes_only_move_momentum_between_wheel_and_body():
 def test_coasts_and_spikes_name_a_wheel_that_is_there(key):
     more = {"stop": "20 s"} if key == "coasts" else {"duration": "20 s", "torque": "0.01 N m"}
     with pytest.raises(BadInput, match="'RWA3', which cassini does not run"):
-        fly("quiet", **{key: [{"wheel": "RWA3", "start": "10 s"} | more]})
+        fly("quiet", changes={key: [{"wheel": "RWA3", "start": "10 s"} | more]})
     with pytest.raises(BadInput):
         bad = {"stop": "5 s"} if key == "coasts" else {"duration": "0 s", "torque": "0.01 N m"}
-        fly("quiet", **{key: [{"wheel": "RWA1", "start": "10 s"} | bad]})
+        fly("quiet", changes={key: [{"wheel": "RWA1", "start": "10 s"} | bad]})

@@ -17,7 +17,7 @@ def test_published_noise_table():
 
 @pytest.fixture(scope="module")
 def long_quiet():
-    return fly("quiet", duration="14400 s", telemetry={"body_rate": "1 s"})
+    return fly("quiet", changes={"duration": "14400 s", "telemetry": {"body_rate": "1 s"}})
 
 
 def test_law_estimation_error_has_the_stated_size_and_time_constant(long_quiet):
@@ -39,22 +39,24 @@ def test_law_gyro_and_wheel_noise_have_the_stated_size(long_quiet):
 
 
 def test_law_the_telemetry_error_is_command_less_estimate_plus_white_noise():
-    flight = fly("quiet", duration="7200 s", telemetry={"attitude_error": "0.125 s"})
+    flight = fly("quiet", changes={"duration": "7200 s", "telemetry": {"attitude_error": "0.125 s"}})
     e = flight.telemetry.channel("attitude_error_x").values
     true = 2 * flight.truth.attitude[:, 1]  # from the command, which is the identity
     assert np.std(e + true + flight.truth.estimation_error_rad[:, 0]) == pytest.approx(5e-6, rel=0.02)
 
 
 def test_law_no_noise_means_none():
-    flight = fly("quiet", noise="none", duration="20 s")
+    flight = fly("quiet", noise="none", changes={"duration": "20 s"})
     for channel in flight.telemetry.channels.values():
         assert np.ptp(channel.values) < 1e-12
 
 
 def test_law_one_sensor_more_changes_no_other():
     assert np.array_equal(stream(3, "gyro").random(4), stream(3, "gyro").random(4))
-    plain = fly("profile-1", duration="60 s").telemetry
-    more = fly("profile-1", duration="60 s", telemetry={"rate_error": "2 s", "controller_rate_error": "2 s"}).telemetry
+    plain = fly("profile-1", changes={"duration": "60 s"}).telemetry
+    more = fly(
+        "profile-1", changes={"duration": "60 s", "telemetry": {"rate_error": "2 s", "controller_rate_error": "2 s"}}
+    ).telemetry
     assert "rate_error_x" in more and "rate_error_x" not in plain
     for name, c in plain.channels.items():
         assert np.array_equal(c.values, more.channel(name).values)
@@ -76,7 +78,7 @@ def test_losses_counts_and_phases():
         "dropout": 0.1, "random_phases": True, "quantum": {"wheel_rate": "0.1 rpm", "body_rate": "1 urad/s"},
         "gaps": [{"channel": "wheel_rate_RWA2", "start": "100 s", "stop": "200 s"}, {"start": "300 s", "stop": "320 s"}],
     }  # fmt: skip
-    t = fly("quiet", telemetry=sent).telemetry
+    t = fly("quiet", changes={"telemetry": sent}).telemetry
     s = t.seconds(t.channel("wheel_rate_RWA2").tai_ns)
     assert not np.any((s > 100) & (s < 200)) and not np.any((s > 300) & (s < 320))
     whole = t.channel("body_rate_x")
@@ -95,12 +97,12 @@ def test_losses_counts_and_phases():
 )  # fmt: skip
 def test_sampling_that_cannot_be_is_refused(sent):
     with pytest.raises(BadInput) as why:
-        fly("quiet", duration="10 s", telemetry=sent)
+        fly("quiet", changes={"duration": "10 s", "telemetry": sent})
     assert len(str(why.value)) < 1400
 
 
 def test_law_quaternions_carry_the_rate_in_a_slew():
-    flight = fly("slews", noise="none", duration="400 s", telemetry={"quaternion": "1 s"})
+    flight = fly("slews", noise="none", changes={"duration": "400 s", "telemetry": {"quaternion": "1 s"}})
     q = np.column_stack([flight.telemetry.channel(f"quaternion_{m}").values for m in "wxyz"])
     from asflown.kit.rotations import rates_between
 

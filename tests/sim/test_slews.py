@@ -16,7 +16,7 @@ from flights import CASSINI
 @pytest.mark.parametrize("name", ["slews-axes", "slews-multi"])
 @pytest.mark.parametrize("swing", [{}, {"flexible": True}, {"flexible": True, "slosh": True, "friction": True}])
 def test_law_the_slews_are_flown_within_the_wheels_limits_and_momentum_balances(name, swing):
-    flight = fly(name, **swing)
+    flight = fly(name, changes=swing)
     truth, torque = flight.truth, np.zeros(3)
     assert flight.ended == "reached 2220 s"
     assert 30 / np.pi * np.abs(truth.wheel_rate_rad_s).max() < 1000
@@ -32,7 +32,7 @@ def test_law_the_slews_are_flown_within_the_wheels_limits_and_momentum_balances(
 @pytest.mark.parametrize("name, weakest", [("slews-axes", 0.3), ("slews-multi", 0.15)])
 def test_law_the_slews_tell_the_whole_tensor(name, weakest):
     """001 eqs 9-11 on the true rates: rank 6, no direction much weaker than the others, and the tensor back."""
-    flight = fly(name, noise="none", torques=[])
+    flight = fly(name, noise="none", changes={"torques": []})
     truth = flight.truth
     every, none = slice(None, None, 32), np.zeros(len(truth.time_s[::32]))
     x, y, z = truth.body_rate_rad_s[every].T
@@ -140,9 +140,9 @@ def test_law_sloshing_energy_and_momentum_balance():
 
 def test_slosh_needs_a_mass_and_fits_into_the_craft():
     with pytest.raises(BadInput, match="mass of the craft"):
-        fly("quiet", slosh=True, duration="10 s")
+        fly("quiet", changes={"slosh": True, "duration": "10 s"})
     with pytest.raises(BadInput, match="weighs less"):
-        fly("slews-axes", slosh=True, craft_mass="50 kg")
+        fly("slews-axes", changes={"slosh": True, "craft_mass": "50 kg"})
     heavy = tuple(p.model_copy(update={"pivot": (0.0, 0.0, 20.0)}) for p in CASSINI.slosh)
     with pytest.raises(BadInput, match="more inertia"):
-        fly("slews-axes", slosh=True, craft=CASSINI.model_copy(update={"slosh": heavy}))
+        fly("slews-axes", craft=CASSINI.model_copy(update={"slosh": heavy}), changes={"slosh": True})

@@ -61,7 +61,7 @@ def test_check_window_exclusion_and_exit_codes(table, tmp_path):
     rpm = saved(telemetry_of(wheel_rate_RWA1=(T, 600 + noise(500))), tmp_path, "rpm.csv")
     assert run("check", rpm).exit_code == 0
     r = run("check", rpm, "--craft", "cassini")
-    assert r.exit_code == 3 and "DOUBT  wheel_rate_RWA1" in r.stdout
+    assert r.exit_code == 3 and "DOUBT! wheel_rate_RWA1" in r.stdout
     assert isinstance(run("check", tmp_path / "none.csv").exception, BadInput)
 
 

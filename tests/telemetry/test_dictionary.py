@@ -76,7 +76,7 @@ BAD = {
     "unknown name": (TIME + WHEEL.replace("wheel_rate", "wheelrate"), "'wheelrate_1'"),
     "unknown unit": (TIME + WHEEL.replace("rpm", "rmp"), "[rmp]"),
     "no size of a count": (TIME + WHEEL.replace("rpm", "count"), "size of one"),
-    "no modulus": (TIME + WHEEL + 'wrap = "0 count"\n', "modulus is positive"),
+    "no modulus": (TIME + WHEEL + 'wrap = "0 count"\n', "must be positive"),
     "nothing": (TIME, "maps no column"),
     "lvlh without orbit": (
         TIME
@@ -170,8 +170,8 @@ def test_lvlh_quaternion_has_the_orbits_turning_removed(tmp_path):
     got = np.stack([found.channel(f"quaternion_{m}").values for m in "wxyz"], axis=1)
     truth = lvlh_to_inertial(r, v) * tilt
     assert np.max((truth.inv() * rotation(got)).magnitude()) < 1e-7  # rad
-    assert not any("quaternion" in d for d in found.doubts)
+    assert not found.doubts
     with pytest.raises(BadInput, match='direction = "body-to-frame"'):
         loaded(tmp_path, table, toml.format("frame-to-body"))
-    with pytest.raises(BadInput, match="does not move with its velocity"):
+    with pytest.raises(BadInput, match="does not change as its velocity predicts"):
         loaded(tmp_path, table, toml.format("body-to-frame").replace('"m/s"', '"km/s"'))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from asflown.kit.errors import BadInput
+from asflown.telemetry.findings import IMPLAUSIBLE
 from asflown.telemetry.screening import dropouts, gaps, needs_a_look, noise_sigma, quantisation_step, screen, summaries
 from flights import CASSINI, EPOCH, telemetry_of
 from telemetry.signals import noise
@@ -184,10 +185,11 @@ def test_rpm_labelled_rad_per_s_is_doubted():
     assert one(rpm, "wheel_rate_RWA1").doubts == ()  # 600 rad/s is possible for some wheel
     t = screen(telemetry_of(wheel_rate_RWA1=(T, rpm), wheel_rate_RWA2=(T, -rpm)), CASSINI)
     assert len(t.doubts) == 1 and needs_a_look(t)
-    assert t.doubts[0].startswith("wheel_rate_RWA1, wheel_rate_RWA2: ") and "rpm labelled" in t.doubts[0]
+    assert t.doubts[0].kind == IMPLAUSIBLE and t.doubts[0].about["channels"] == "wheel_rate_RWA1, wheel_rate_RWA2"
+    assert "rpm labelled" in str(t.doubts[0])
     assert "unit?" in summaries(t)[0].suspicions
-    assert any("rpm" in d for d in one(2000 + noise(500), "wheel_rate_A").doubts)
-    assert any("mrad" in d for d in one(noise(500, 0.3), "attitude_error_x").doubts)
+    assert one(2000 + noise(500), "wheel_rate_A").doubts.has(IMPLAUSIBLE)
+    assert "mrad" in str(one(noise(500, 0.3), "attitude_error_x").doubts.of(IMPLAUSIBLE)[0])
 
 
 def test_noise_and_quantisation_are_measured():

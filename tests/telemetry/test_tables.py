@@ -83,15 +83,15 @@ BAD = {
     "unknown unit": (b"time [s],body_rate_x [furlong]\n1,2\n", "[furlong]"),
     "wrong unit": (b"time [s],body_rate_x [kg]\n1,2\n", "[kg]"),
     "unknown channel": (b"time [s],body_rat_x [rad/s]\n1,2\n", "body_rate_x"),
-    "ragged": (b"time [s],body_rate_x [rad/s]\n0,1e-3\n# note\n1\n", "line 4: 1 cells where the header has 2"),
+    "ragged": (b"time [s],body_rate_x [rad/s]\n0,1e-3\n# note\n1\n", "line 4: the row has 1 cells, the header 2"),
     "not a number": (b"time [s],body_rate_x [rad/s]\n0,1e-3\n1,12_3\n", "line 3, channel body_rate_x: '12_3'"),
     "words": (b"time [s],body_rate_x [rad/s]\n0,1e-3\n1,high\n", "line 3, channel body_rate_x: 'high'"),
-    "all blank": (b"time [s],body_rate_x [rad/s],body_rate_y [rad/s]\n0,1e-3,\n1,1e-3, \n", "no value at all"),
+    "all blank": (b"time [s],body_rate_x [rad/s],body_rate_y [rad/s]\n0,1e-3,\n1,1e-3, \n", "has no values"),
     "infinite": (b"time [s],body_rate_x [rad/s]\n0,inf\n1,0\n", "line 2, channel body_rate_x: 'inf' is not finite"),
     "too large": (b"time [s],orbit_position_x [km]\n0,1e307\n1,0\n", "too large"),
     "twice": (b"time [s],body_rate_x [rad/s],body_rate_x [rad/s]\n0,1,1\n", "twice"),
     "twice, two units": (b"time [s],body_rate_x [rad/s],body_rate_x [deg/s]\n0,1,1\n", "two columns"),
-    "only time": (b"time [s]\n0\n1\n", "no channel besides time"),
+    "only time": (b"time [s]\n0\n1\n", "no channel other than time"),
     "blank time": (b"time [s],body_rate_x [rad/s]\n,1\n", "line 2"),
     "odd time": (b"time [s],body_rate_x [rad/s]\nnan,1\n", "is not a time"),
     "far time": (b"time [s],body_rate_x [rad/s]\n1e300,1\n", "is not a time"),
@@ -119,7 +119,7 @@ def test_bad_paths(tmp_path):
     for path, words in ((tmp_path / "none.csv", "no such file"), (tmp_path, "directory"), ("a\0b", "cannot be opened")):
         with pytest.raises(BadInput, match=words):
             load_telemetry(path)
-    with pytest.raises(BadInput, match="its content does not"):
+    with pytest.raises(BadInput, match="the content is not"):
         load_telemetry(written(tmp_path, GOOD, "t.parquet"))
     for magic, name in ((b"PAR1", "t.parquet"), (b"\x89HDF\r\n\x1a\n", "t.nc"), (b"CDF\x01", "t.nc")):
         with pytest.raises(BadInput, match="cannot be read"):

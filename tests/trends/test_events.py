@@ -48,14 +48,14 @@ def test_law_toml_and_csv_say_the_same(tmp_path):
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (('id = "b"', 'id = "a"'), "two events are called 'a'"),
+        (('id = "b"', 'id = "a"'), "two events have the id 'a'"),
         (('kind = "stow"', 'kind = "slew"'), "kind"),
         (('note = "only its date"', "color = 1"), "unknown key"),
-        (('file = "a.csv"', 'file = "missing.csv"'), "no file missing.csv"),
+        (('file = "a.csv"', 'file = "missing.csv"'), "missing.csv does not exist"),
         (("motor_on_s = 60\n", ""), "needs motor_on_s and motor_off_s"),
-        (("motor_on_s = 60", "motor_on_s = 500"), "off before it is on"),
+        (("motor_on_s = 60", "motor_on_s = 500"), "is before motor_on_s"),
         (("motor_on_s = 60", "motor_on_s = nan"), "motor_on_s"),
-        (('date = "2015-273T00:00:00"', ""), "without a file it needs a date"),
+        (('date = "2015-273T00:00:00"', ""), "an event without a file needs a date"),
         (('"2015-273T00:00:00"', '"yesterday"'), "not a time"),
         (("[[event]]", "[[event"), "not a TOML file"),
     ],
@@ -71,7 +71,7 @@ def test_bad_csv_rows_name_their_line(tmp_path):
     with pytest.raises(BadInput, match="not a number") as why:
         load_events(listed(tmp_path, CSV.replace("a.csv,60,", "a.csv,soon,"), "events.csv"))
     assert why.value.line == 2
-    with pytest.raises(BadInput, match="as many cells"):
+    with pytest.raises(BadInput, match="number of cells"):
         load_events(listed(tmp_path, CSV + "c,stow\n", "events.csv"))
 
 
@@ -94,7 +94,7 @@ def test_recovery_stall_lies_between_two_samples():
 
 def test_a_motor_that_never_runs_is_said():
     quiet = flown("cover-deploy", noise="none").telemetry.between(0, 55)
-    with pytest.raises(BadInput, match="no whole actuation"):
+    with pytest.raises(BadInput, match="no complete actuation"):
         find_events(quiet)
 
 

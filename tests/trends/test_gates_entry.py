@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asflown.estimate.gates.fit import fit_gates
+from asflown.estimate.gates import gates
 from asflown.kit.errors import BadInput
 from asflown.kit.timeline import utc_to_tai_ns
 from asflown.maneuvers.history import past_model
@@ -29,12 +29,12 @@ def burns(year: int, seed, **changes):
 
 
 def epochs(seed: int, **changes):
-    return [gates_entry(fit_gates(burns(y, [seed, y], **changes)), CASSINI, None, {}) for y in YEARS]
+    return [gates_entry(gates(burns(y, [seed, y], **changes)), CASSINI) for y in YEARS]
 
 
 def test_an_entry_holds_every_parameter_with_its_sigma():
-    fit = fit_gates(burns(2005, 1))
-    entry = gates_entry(fit, CASSINI, None, {"seed": 1})
+    fit = gates(burns(2005, 1))
+    entry = gates_entry(fit, CASSINI)
     assert (entry.kind, entry.event, entry.date[:10]) == ("gates", "gates-rcs-2005-12-03", "2005-12-03")
     held = {v.figure: v for v in entry.values}
     assert set(held) == {
@@ -52,15 +52,15 @@ def test_an_entry_holds_every_parameter_with_its_sigma():
     )
     assert held["pointing_bias_y_proportional_rcs"].value == fit.pointing.point.beta[3]
     assert held["pointing_bias_y_proportional_rcs"].unit == "rad" and held["magnitude_proportional_rcs"].unit == ""
-    assert entry.doubts == fit.doubts and entry.provenance == {"seed": 1}
+    assert entry.doubts == fit.doubts and entry.provenance == fit.provenance
 
 
 def test_what_is_held_is_no_estimate_and_a_limit_counts_as_zero():
     m = burns(2005, 2)
-    held = gates_entry(fit_gates(m, hold={"pointing_fixed": 0.0}), CASSINI, "mine", {})
+    held = gates_entry(gates(m, hold={"pointing_fixed": 0.0}), CASSINI, "mine")
     assert held.event == "mine" and held.best("pointing_fixed_rcs") is None
-    fit = next(f for s in range(20) if "pointing.fixed" in (f := fit_gates(burns(2005, s))).at_bound)
-    limit = gates_entry(fit, CASSINI, None, {}).best("pointing_fixed_rcs")
+    fit = next(f for s in range(20) if "pointing.fixed" in (f := gates(burns(2005, s))).at_bound)
+    limit = gates_entry(fit, CASSINI).best("pointing_fixed_rcs")
     assert limit.value == 0 and limit.sigma == pytest.approx(fit.pointing.interval("fixed")[1] / 1.96)
 
 
@@ -70,10 +70,10 @@ def test_other_readings_are_kept_apart_and_few_burns_give_nothing():
         ({"model": "zero-mean"}, "zero-mean, additive"),
         ({"likelihood": "unweighted"}, "estimated-bias, unweighted"),
     ):
-        assert {v.basis for v in gates_entry(fit_gates(m, **words), CASSINI, None, {}).values} == {basis}
-    assert gates_entry(fit_gates(m.take(range(5))), CASSINI, None, {}).known == 0
-    with pytest.raises(BadInput, match="no place in a trend"):
-        gates_entry(fit_gates(replace(m, tai_ns=None)), CASSINI, None, {})
+        assert {v.basis for v in gates_entry(gates(m, **words), CASSINI).values} == {basis}
+    assert gates_entry(gates(m.take(range(5))), CASSINI).known == 0
+    with pytest.raises(BadInput, match="cannot enter a trend"):
+        gates_entry(gates(replace(m, tai_ns=None)), CASSINI)
 
 
 def test_recovery_of_an_engine_that_loses_thrust_or_scatters_more():
@@ -93,7 +93,7 @@ def test_recovery_of_false_alarms_of_epochs_that_do_not_change():
 def test_program_keeps_shows_watches_and_reports(tmp_path):
     store, table, page = tmp_path / "s.db", tmp_path / "set.csv", tmp_path / "page.html"
     with TrendStore.open(store) as trends:
-        trends.add([gates_entry(fit_gates(burns(y, y)), CASSINI, None, {}) for y in YEARS])
+        trends.add([gates_entry(gates(burns(y, y)), CASSINI) for y in YEARS])
     run("gates", "simulate", "--by", "rcs/2012-1", "--start", "2014-01-01", "--out", table)
     done = run("gates", table, "--store", store, "--id", "mine")
     assert done.code == 0 and "kept as mine" in done.err
@@ -105,5 +105,5 @@ def test_program_keeps_shows_watches_and_reports(tmp_path):
     text = page.read_text()
     assert "9 gates" in text and "magnitude fixed rcs" in text and text.count("<svg") == 10 and "cycles</p>" not in text
     run("gates", "simulate", "--out", table)
-    assert "no place in a trend" in complaint("gates", table, "--store", store)
+    assert "cannot enter a trend" in complaint("gates", table, "--store", store)
     assert "is not a time" in complaint("gates", "simulate", "--start", "soon", "--out", table)

@@ -25,6 +25,7 @@ from sqlalchemy import create_engine, event, text
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import DBAPIError
 
+from asflown.kit.doubts import Doubts
 from asflown.kit.errors import BadInput
 from asflown.trends.entry import Curve, Entry, Value
 from asflown.trends.store import place
@@ -236,7 +237,7 @@ def test_law_a_list_with_one_impossible_entry_keeps_none(url):
         "shape": replace(a, curves=(Curve("c", "s", t, t[:2]),)),
         "differ": replace(a, curves=(Curve("c", "s", t, t, np.zeros((3, 1))),)),
         "NUL": replace(a, note="a\0b"),
-        "half a character": replace(a, doubts=("\ud800",)),
+        "half a character": replace(a, doubts=Doubts(["\ud800"])),
         "without craft or event": replace(a, event=""),
         "the date '2005-001'": replace(a, date="2005-001"),
     }
@@ -414,7 +415,7 @@ def test_law_another_programs_database_is_left_alone(url):
     with raw_empty(url) as c:
         c.execute(text("CREATE TABLE accounts (id INTEGER)"))
         c.commit()
-    with pytest.raises(BadInput, match="not a trend store: it holds accounts"):
+    with pytest.raises(BadInput, match="not a trend store: its tables are accounts"):
         TrendStore.open(url)
     with raw(url) as c:
         assert c.dialect.get_table_names(c) == ["accounts"]
@@ -433,7 +434,7 @@ def raw_empty(url):
 
 
 def test_law_reading_makes_nothing_and_changes_nothing(url):
-    with pytest.raises(BadInput, match=r"no trend store is there[\s\S]*trend add"):
+    with pytest.raises(BadInput, match=r"there is no trend store[\s\S]*trend add"):
         TrendStore.open(url, create=False)
     TrendStore.open(url).close()
     if "://" in url:
@@ -476,7 +477,7 @@ def test_law_postgresql_needs_no_more_than_the_right_to_read_or_to_insert(server
             with pytest.raises(BadInput, match="permission denied") as why:
                 store.add(entry("b"))
         assert "geheim" not in str(why.value)
-        with pytest.raises(BadInput, match="may be read, but not written"):
+        with pytest.raises(BadInput, match="can be read but not written"):
             TrendStore.open(theirs)
         with engine.connect() as c:
             c.execute(text(f"GRANT INSERT ON ALL TABLES IN SCHEMA {schema} TO {role}"))
@@ -496,8 +497,8 @@ def test_law_postgresql_needs_no_more_than_the_right_to_read_or_to_insert(server
 @pytest.mark.parametrize(
     ("url", "why"),
     [
-        ("", "no place"),
-        (":memory:", "no place"),
+        ("", "no path or URL"),
+        (":memory:", "no path or URL"),
         ("sqlite://", "names no file"),
         ("sqlite:///x.db?mode=ro", "names no file"),
         ("mysql://me:geheim@host/db", "'mysql'"),
@@ -524,7 +525,7 @@ def test_bad_place_is_one_clear_error_without_the_password(url, why):
 
 @pytest.mark.parametrize("password", ["me:geheim@host/db", "me:ge/heim@host/db", "me@host/db?password=geheim"])
 def test_law_a_report_names_a_store_without_its_password(password):
-    from asflown.cli.trend import without_password
+    from asflown.cli.trend.store_options import without_password
 
     named = without_password(f"postgresql://{password}")
     assert named.startswith("postgresql://me") and named.endswith("@host/db") and "heim" not in named
@@ -538,7 +539,7 @@ def test_bad_files_are_one_clear_error_and_left_as_they_are(tmp_path):
     for name, content, why in (
         ("short.db", b"a,b\n1,2\n", r"not a database[\s\S]*another file"),
         ("long.db", b"a,b\n1,2\n" * 1000, r"not a database"),
-        ("empty.db", b"", "no trend store is there"),
+        ("empty.db", b"", "there is no trend store"),
         ("cut.db", good[: len(good) // 2], r"malformed[\s\S]*backup"),
     ):
         path = tmp_path / name
@@ -549,9 +550,9 @@ def test_bad_files_are_one_clear_error_and_left_as_they_are(tmp_path):
         assert path.read_bytes() == content
     with pytest.raises(BadInput, match="directory"):
         TrendStore.open(tmp_path)
-    with pytest.raises(BadInput, match="no trend store is there"):
+    with pytest.raises(BadInput, match="there is no trend store"):
         TrendStore.open(tmp_path, create=False)
-    with pytest.raises(BadInput, match="no trend store is there"):
+    with pytest.raises(BadInput, match="there is no trend store"):
         TrendStore.open(tmp_path / (300 * "x"), create=False)
     assert not list(tmp_path.glob("*-wal"))
 

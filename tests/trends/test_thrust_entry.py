@@ -38,11 +38,14 @@ def records(seed: int, weak: float = 1.0, faster: float = 0.0):
             * np.where(np.array(NAMES) == "Z3", weak if date == DATES[-1] else 1, 1)
         )
         result = ThrustResult(
-            "cassini", date, "joint", "corrected", NAMES, {n: mean * r for n, r in zip(NAMES, ratios, strict=True)},
-            dict.fromkeys(NAMES, 0.02), mean, 0.02, {}, dict.fromkeys(NAMES, 1.0), dict.fromkeys(NAMES, 8.0), True, 0.065, 0.004,
-            over_mean={n: (r, OWN) for n, r in zip(NAMES, ratios, strict=True)}, predicted_N=predicted,
+            craft="cassini", epoch=date, method="joint", names=NAMES,
+            thrust_N={n: mean * r for n, r in zip(NAMES, ratios, strict=True)},
+            thrust_sigma_N=dict.fromkeys(NAMES, 0.02), mean_thrust_N=mean, mean_thrust_sigma_N=0.02, pulse_ratio={},
+            on_time_s=dict.fromkeys(NAMES, 1.0), pulses=dict.fromkeys(NAMES, 8.0), pulses_counted=True,
+            fall_time_s=0.065, fall_time_sigma_s=0.004,
+            over_mean={n: (r, OWN) for n, r in zip(NAMES, ratios, strict=True)}, predicted_thrust_N=predicted,
         )  # fmt: skip
-        entries.append(thrust_entry(result, telemetry_of(ns, body_rate_x=([0], [0])), CASSINI, None, {}))
+        entries.append(thrust_entry(result, telemetry_of(ns, body_rate_x=([0], [0])), CASSINI))
     return entries
 
 
@@ -77,10 +80,10 @@ def test_recovery_of_a_thrust_that_falls_faster_than_predicted():
 def test_other_methods_are_kept_apart_and_a_record_needs_a_date(tmp_path):
     flight = fly("wheel-bias-day28", craft=CASSINI)
     printed = thrust(flight.telemetry, CASSINI, method="printed")
-    bases = {v.basis for v in thrust_entry(printed, flight.telemetry, CASSINI, "mine", {}).values}
+    bases = {v.basis for v in thrust_entry(printed, flight.telemetry, CASSINI, "mine").values}
     assert bases == {"printed, corrected"}
-    with pytest.raises(BadInput, match="no place in a trend"):
-        thrust_entry(printed, replace(flight.telemetry, dated=False), CASSINI, None, {})
+    with pytest.raises(BadInput, match="cannot enter a trend"):
+        thrust_entry(printed, replace(flight.telemetry, dated=False), CASSINI)
 
 
 def test_program_watches_thrust(tmp_path):
@@ -101,8 +104,10 @@ def test_recovery_of_a_degraded_thruster_flown_end_to_end():
     entries = []
     for k, date in enumerate(DATES[:8]):
         weak = [{"thruster": "Z3", "start": "0 s", "factor": 0.85}] if k == 7 else []
-        flight = fly("wheel-bias-day28", craft=CASSINI, seed=k, epoch=f"{date}T00:00:00", thruster_faults=weak)
+        flight = fly(
+            "wheel-bias-day28", craft=CASSINI, seed=k, changes={"epoch": f"{date}T00:00:00", "thruster_faults": weak}
+        )
         result = thrust(flight.telemetry, CASSINI, priors=priors_for(CASSINI, center_sigma_m=(0.01, 0.01, 0.1)))
-        entries.append(thrust_entry(result, flight.telemetry, CASSINI, None, {}))
+        entries.append(thrust_entry(result, flight.telemetry, CASSINI))
     health = judge(entries, kind="thrust")
     assert health.verdict == "alarm" and any("thrust_Z3_over_mean" in r for r in health.reasons)

@@ -10,7 +10,7 @@ from ..estimate.fused import PEAK_REACH_S
 from ..estimate.torque import TorqueResult, best_lag, peak_near
 from ..telemetry.channels import AXES
 
-#: 000 Tables 3 and 4: unsigned percent errors of T_Hrwa at the six peaks, as printed.
+#: The cover paper's Tables 3 and 4: unsigned percent errors of T_Hrwa at the six peaks, as printed.
 PUBLISHED_PEAK_ERRORS = {
     "profile-1": (1.20, 2.38, 4.08, 5.97, 4.74, 2.81),
     "profile-2": (5.87, 9.91, 9.11, 4.38, 9.13, 5.89),

@@ -14,13 +14,14 @@ app = typer.Typer(help=__doc__, rich_markup_mode=None)
 def list_(json: bool = JSON) -> None:
     """The built-in crafts."""
     from ..craft.load import built_in_crafts, load_craft
+    from ..kit.doubts import Doubts
 
     crafts = [load_craft(n) for n in built_in_crafts()]
     if json:
         print_json({
             "command": "craft list",
             "crafts": [{"name": c.name, "description": c.description, "alternatives": list(c.alternatives)} for c in crafts],
-            "doubts": [], "provenance": provenance({}, {}),
+            **Doubts().record(), "provenance": provenance({}, {}),
         })  # fmt: skip
         return
     for c in crafts:
@@ -74,16 +75,16 @@ def show(
 
 
 def _by_timing(thrusters) -> dict[str, list[str]]:
-    """Thrusters that open and close alike, together."""
+    """Thrusters with the same delay, rise and fall, together."""
     found: dict[str, list[str]] = {}
     for t in thrusters:
         found.setdefault(f"{1e3 * t.delay:g}, {1e3 * t.rise:g}, {1e3 * t.fall:g}", []).append(t.name)
     return found
 
 
-@app.command(short_help="Say what is wrong with a craft file, or that nothing is.")
+@app.command(short_help="Check a craft file.")
 def check(file: str = typer.Argument(help="A craft TOML file."), json: bool = JSON) -> None:
-    """Read a craft file and say what is wrong with it, or that nothing is."""
+    """Check a craft file, and report its first error."""
     from ..craft.load import load_craft
 
     c = load_craft(file)
@@ -118,5 +119,5 @@ def _record(c, now, at) -> dict:
         },
         "center_of_mass_m": c.center_of_mass,
         "center_of_mass_assumed_m": c.center_of_mass_assumed,
-        "doubts": list(now.doubts),
+        **now.doubts.record(),
     }  # fmt: skip

@@ -23,24 +23,12 @@ from .flyby_options import (
     flyby_from,
     sources_from,
 )
-from .options import (
-    CHANNELS,
-    CRAFT,
-    EXCLUDE,
-    INERTIA,
-    JSON,
-    PLOT_DIR,
-    START,
-    STOP,
-    check_picture,
-    craft_from,
-    hashes,
-    telemetry_from,
-)
-from .output import print_doubts, print_json, provenance, say
+from .job import Job
+from .options import CHANNELS, CRAFT, EXCLUDE, INERTIA, JSON, PLOT_DIR, START, STOP
 
 
 def density(
+    context: typer.Context,
     file: Path = typer.Argument(help="Telemetry: CSV (plain or gzip), Parquet, NetCDF or HDF5."),
     flyby: str = FLYBY,
     closest_approach: str = CLOSEST,
@@ -48,7 +36,7 @@ def density(
     axis: str = AXIS,
     method: str = METHOD,
     variant: str = typer.Option(
-        "corrected", "--variant", help="corrected, or printed: 004's constant and errors (E3)."
+        "corrected", "--variant", help="corrected, or printed: the plume paper's constant and errors (E3 only)."
     ),
     area: str = AREA,
     arm: str = ARM,
@@ -68,36 +56,17 @@ def density(
     json: bool = JSON,
 ) -> None:
     """Density of the gas that a craft meets in a flyby, from the torque it exerts."""
-    from ..estimate.density import density as density_of
-    from ..kit.files import check_folder
+    from ..estimate.density import density as gas_density
+    from ..plots.flyby import flyby_figures
 
-    check_picture(plot)
-    if plot_dir is not None:
-        check_folder(plot_dir)
-    ship = craft_from(craft, inertia, None)
-    telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
-    path, of_path = flyby_from(flyby, closest_approach, trajectory, kernels, telemetry, ship)
-    drag = drag_from(axis, method, area, arm, velocity, up, drag_table)
+    job = Job(context)
+    telemetry = job.telemetry()
+    path, of_path = flyby_from(job, telemetry)
     given = sources_from(source, path)
-    result = density_of(telemetry, ship, path, closest_approach, variant=variant, sources=given, **drag)
-    if plot is not None:
-        from ..plots.density import save_density_figure
-
-        save_density_figure(result, plot)
-        say(f"wrote {plot}")
-    if plot_dir is not None:
-        from ..plots.figure import save_figures
-        from ..plots.flyby import flyby_figures
-
-        for path in save_figures(flyby_figures(result, telemetry, ship, sources=given), plot_dir):
-            say(f"wrote {path}")
-    if json:
-        options = {"craft": craft, "flyby": result.flyby.name, "closest_approach": closest_approach, "axis": result.axis,
-                   "method": result.method, "variant": variant, "area": area, "arm": arm, "drag_table": drag_table, "source": source,
-                   "velocity": velocity, "up": up, "trajectory": trajectory, "kernels": kernels, "start": start, "stop": stop,
-                   "inertia": inertia}  # fmt: skip
-        record = {"command": "density"} | result.record()
-        print_json(record | {"provenance": provenance(inputs | of_path | hashes(craft, drag_table), options)})
-        return
-    print(result)
-    print_doubts(result.doubts)
+    result = gas_density(telemetry, job.craft, path, closest_approach, variant=variant, sources=given, **drag_from(job))
+    job.finish(
+        result,
+        inputs=of_path,
+        options={"flyby": path.name, "axis": result.axis, "method": result.method},
+        figures=lambda _: flyby_figures(result, telemetry, sources=given),
+    )

@@ -1,8 +1,14 @@
-"""Options of the verbs that take a flyby, declared once."""
+"""Options of the verbs that take a flyby, declared once, and what they say."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import typer
+
+if TYPE_CHECKING:
+    from ..telemetry.telemetry import Telemetry
+    from .job import Job
 
 FLYBY = typer.Option(..., "--flyby", help="Of Enceladus: E3, E4, E5 or E9; or Titan.")
 CLOSEST = typer.Option(..., "--closest-approach", help="UTC, or seconds from the file's epoch.")
@@ -12,7 +18,7 @@ AXIS = typer.Option(
 METHOD = typer.Option(
     None,
     "--method",
-    help="Of the torque: fused (default), momentum, transfer, polynomial; on-times where thrusters fire; with attitude errors and no body rates, transfer.",
+    help="Of the torque: fused, momentum, transfer, polynomial, or on-times. By default on-times where thrusters fire, transfer where there are attitude errors and no body rates, else fused.",
 )
 AREA = typer.Option(None, "--area", help='Projected area, as in "18.4 m2"; the craft\'s unless given.')
 ARM = typer.Option(None, "--arm", help='Moment arm, as in "0.85 m"; the craft\'s unless given.')
@@ -34,28 +40,19 @@ KERNELS = typer.Option(
 )
 
 
-def flyby_from(name: str, closest: str, trajectory, kernels, telemetry, craft):
-    """The flyby that --flyby names, along a trajectory where one is given; and its inputs' SHA-256."""
+def flyby_from(job: Job, telemetry: Telemetry):
+    """The flyby that --flyby names, along a trajectory where one is given; and the input that this is, if any."""
     from ..dynamics.flyby import flyby_called
     from ..dynamics.trajectory import Trajectory
     from ..kit.errors import BadInput
+    from ..kit.result import Input
     from ..kit.timeline import NS
 
-    flyby = flyby_called(name)
-    if trajectory is None and not kernels:
-        return flyby, {}
-    if trajectory is not None and kernels:
-        raise BadInput("--trajectory and --kernels both give the path", remedy="Give one of them.")
-    closest_ns = telemetry.moment(closest)
-    if trajectory is not None:
-        from ..telemetry.trajectory import load_trajectory
-
-        table, source = load_trajectory(trajectory), str(trajectory)
-    else:
-        from ..telemetry.kernels import trajectory_from_kernels
-
-        source = ", ".join(map(str, kernels))
-        table = trajectory_from_kernels(kernels, craft.name.upper(), flyby.moon.name, closest_ns)
+    flyby = flyby_called(job.given["flyby"])
+    if job.given["trajectory"] is None and not job.given["kernels"]:
+        return flyby, []
+    closest_ns = telemetry.moment(job.given["closest_approach"])
+    table, source = _trajectory(job, flyby.moon.name, closest_ns)
     if table.dated and not telemetry.dated:
         raise BadInput(
             "the trajectory has dates and the telemetry has none",
@@ -67,19 +64,37 @@ def flyby_from(name: str, closest: str, trajectory, kernels, telemetry, craft):
         path = Trajectory.along(flyby, time_s, table.position_m, table.velocity_m_s)
     except BadInput as why:
         raise why.within(source) from None
-    return path, {source: table.sha256}
+    return path, [Input(source, table.sha256)]
 
 
-def drag_from(axis, method, area, arm, velocity, up, drag_table) -> dict:
-    """What these options say, as ``estimate.density.density`` takes it."""
+def _trajectory(job: Job, body: str, closest_ns: int):
+    """The table of --trajectory or --kernels, and what it is called."""
+    from ..kit.errors import BadInput
+
+    trajectory, kernels = job.given["trajectory"], job.given["kernels"]
+    if trajectory is not None and kernels:
+        raise BadInput("--trajectory and --kernels both give the path", remedy="Give one of them.")
+    if trajectory is not None:
+        from ..telemetry.trajectory import load_trajectory
+
+        return load_trajectory(trajectory), str(trajectory)
+    from ..telemetry.kernels import trajectory_from_kernels
+
+    table = trajectory_from_kernels(kernels, job.craft.name.upper(), body, closest_ns)
+    return table, ", ".join(map(str, kernels))
+
+
+def drag_from(job: Job) -> dict:
+    """What the options of drag and attitude say, as ``density`` and ``jets`` take it."""
     from ..kit.quantities import plain_numbers, quantity
 
+    area, arm, velocity, up = (job.given[n] for n in ("area", "arm", "velocity", "up"))
     return {
-        "axis": axis,
-        "method": method,
+        "axis": job.given["axis"],
+        "method": job.given["method"],
         "area_m2": None if area is None else quantity(area, "m2"),
         "arm_m": None if arm is None else quantity(arm, "m"),
-        "drag_table": drag_table,
+        "drag_table": job.given["drag_table"],
         "velocity_B": None if velocity is None else plain_numbers(velocity, 3, "--velocity"),
         "up_B": None if up is None else plain_numbers(up, 3, "--up"),
     }

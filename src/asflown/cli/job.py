@@ -5,7 +5,7 @@
     job.finish(result)
 
 Options are read from the verb's own parameters by name (``craft``, ``inertia``, ``cm``, ``channels``, ``exclude``, ``start``,
-``stop``, ``out``, ``plot``, ``plot_dir``, ``store``, ``name``, ``json``), so that a verb states only what is its own.
+``stop``, ``out``, ``folder``, ``plot``, ``plot_dir``, ``store``, ``name``, ``json``), so that a verb states only what is its own.
 """
 
 from __future__ import annotations
@@ -23,12 +23,30 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from ..craft.model import Craft
+    from ..kit.doubts import Doubts
     from ..kit.result import Estimate, Input
     from ..telemetry.telemetry import Telemetry
     from ..trends.entry import Entry
 
 #: Parameters that say how to answer, not what was asked: they are no part of the provenance's options.
-_NOT_OPTIONS = frozenset({"file", "files", "json", "plot", "plot_dir", "out", "store", "name", "channels", "exclude"})
+_NOT_OPTIONS = frozenset(
+    {
+        "file",
+        "files",
+        "plan",
+        "json",
+        "plot",
+        "plot_dir",
+        "out",
+        "table",
+        "report",
+        "folder",
+        "store",
+        "name",
+        "channels",
+        "exclude",
+    }
+)
 
 
 class Job:
@@ -44,12 +62,16 @@ class Job:
     @cached_property
     def craft(self) -> Craft:
         """The craft that --craft, --inertia and --cm name."""
+        return self.craft_named(self.given["craft"])
+
+    def craft_named(self, name: str) -> Craft:
+        """A craft with --inertia and --cm in place of its own."""
         from ..craft.load import load_craft
         from ..kit.quantities import plain_numbers
 
         inertia, cm = self.given.get("inertia"), self.given.get("cm")
         return load_craft(
-            self.given["craft"],
+            name,
             inertia=plain_numbers(inertia, 6, "--inertia") if inertia is not None else None,
             cm=plain_numbers(cm, 3, "--cm") if cm is not None else None,
         )
@@ -83,7 +105,7 @@ class Job:
         options: dict | None = None,
         more: dict | None = None,
         entry: Callable[[Estimate, str | None], Entry] | None = None,
-        figures: Callable[[Estimate], dict] | None = None,
+        figures: Callable[[Any], dict] | None = None,
         text: Callable[[], None] | None = None,
         failed: bool = False,
     ) -> None:
@@ -101,15 +123,31 @@ class Job:
         if self.given.get("store") is not None and entry is not None:
             self._keep(entry(result, self.given.get("name")))
         self._write(result, figures)
-        if self.given.get("json"):
-            print_json({"command": self.verb} | result.record() | (more or {}) | {"provenance": result.provenance})
-        else:
+
+        def table() -> None:
             print(result)
             if text is not None:
                 text()
-            print_doubts(result.doubts)
+
+        self._tell(result.record() | (more or {}), result.provenance, result.doubts, table)
         if failed:
             raise typer.Exit(3)
+
+    def tell(
+        self, record: dict, doubts: Doubts, text: Callable[[], None], *, inputs=(), options=None, seed=None
+    ) -> None:
+        """The end of a verb whose result is no estimate: its ``record`` with doubts and provenance as JSON, or its text."""
+        from ..kit.result import provenance
+
+        told = provenance(inputs, self.options | (options or {}), seed)
+        self._tell(record | doubts.record(), told, doubts, text)
+
+    def _tell(self, record: dict, provenance: dict, doubts: Doubts, text: Callable[[], None]) -> None:
+        if self.given.get("json"):
+            print_json({"command": self.verb} | record | {"provenance": provenance})
+        else:
+            text()
+            print_doubts(doubts)
 
     def _write(self, result: Estimate, figures) -> None:
         out, plot, plot_dir = (self.given.get(n) for n in ("out", "plot", "plot_dir"))
@@ -136,16 +174,18 @@ class Job:
 
     def _check_places(self) -> None:
         """Before the work: whether what it makes can be written."""
-        out, plot, plot_dir = (self.given.get(n) for n in ("out", "plot", "plot_dir"))
-        if out is None and plot is None and plot_dir is None:
+        out, plot, plot_dir, folder = (self.given.get(n) for n in ("out", "plot", "plot_dir", "folder"))
+        if out is None and plot is None and plot_dir is None and folder is None:
             return
         from ..kit.files import check_folder, check_place
-        from ..plots.figure import picture_kind
 
         for place in (out, plot):
             if place is not None:
                 check_place(place)
         if plot is not None:
+            from ..plots.figure import picture_kind
+
             picture_kind(plot)
-        if plot_dir is not None:
-            check_folder(plot_dir)
+        for place in (plot_dir, folder):
+            if place is not None:
+                check_folder(place)

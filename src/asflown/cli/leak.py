@@ -6,27 +6,12 @@ from pathlib import Path
 
 import typer
 
-from .options import (
-    CHANNELS,
-    CM,
-    CRAFT,
-    EXCLUDE,
-    INERTIA,
-    INERTIA_SIGMA,
-    JSON,
-    SPIN_SIGMA,
-    START,
-    STOP,
-    UNLIKE,
-    check_picture,
-    craft_from,
-    hashes,
-    telemetry_from,
-)
-from .output import print_doubts, print_json, provenance, say
+from .job import Job
+from .options import CHANNELS, CM, CRAFT, EXCLUDE, INERTIA, INERTIA_SIGMA, JSON, SPIN_SIGMA, START, STOP, UNLIKE
 
 
 def leak(
+    context: typer.Context,
     file: Path = typer.Argument(help="Telemetry: CSV (plain or gzip), Parquet, NetCDF or HDF5."),
     craft: str = CRAFT,
     method: str = typer.Option(
@@ -55,11 +40,9 @@ def leak(
     inertia_sigma: float = INERTIA_SIGMA,
     spin_sigma: float = SPIN_SIGMA,
     torque_sigma: str = typer.Option(
-        None, "--torque-sigma", help='Of the steady torque from outside, "3e-6 N m" unless given.'
+        None, "--torque-sigma", help='One sigma of the steady external torque; "3e-6 N m".'
     ),
-    torque_walk: str = typer.Option(
-        None, "--torque-walk", help='By how much that walks in an hour, "1e-6 N m" unless given.'
-    ),
+    torque_walk: str = typer.Option(None, "--torque-walk", help='One sigma of its change in an hour; "1e-6 N m".'),
     start: str = START,
     stop: str = STOP,
     channels: Path = CHANNELS,
@@ -72,53 +55,43 @@ def leak(
     json: bool = JSON,
 ) -> None:
     """Leaking and weak thrusters, from momentum that orders do not explain.  Exit code 3 on an alarm."""
-    from ..estimate.leak import LeakWatch, known_for
+    job = Job(context)
+    watch = _watch(job)
+    if follow:
+        _followed(watch, file, patience, job.telemetry)
+    else:
+        watch.take(job.telemetry(), final=True)
+    result = watch.result()
+    job.finish(result, failed=result.alarm)
+
+
+def _watch(job: Job):
+    """The monitor that the options ask for."""
+    from ..estimate.leak import LeakWatch, leak_known
     from ..kit.quantities import numbers, quantity
 
-    check_picture(plot)
-    ship = craft_from(craft, inertia, cm)
-    watch = LeakWatch(
-        ship,
-        method=method,
-        false_alarms_per_hour=false_alarms,
-        window_s=window,
-        thrust_N=None if thrust is None else quantity(thrust, "N"),
-        momentum_Nms=momentum,
-        known=known_for(
-            ship,
-            thrust_share=thrust_sigma,
-            each_share=unlike,
-            pulse_share=pulse_scatter,
-            center_of_mass_m=None if cm_sigma is None else numbers(cm_sigma, "m", 3),
-            inertia_share=inertia_sigma,
-            spin_share=spin_sigma,
-            torque_Nm=None if torque_sigma is None else quantity(torque_sigma, "N m"),
-            torque_in_an_hour_Nm=None if torque_walk is None else quantity(torque_walk, "N m"),
-        ),
+    given = job.given
+    thrust, center, torque, walk = (given[n] for n in ("thrust", "cm_sigma", "torque_sigma", "torque_walk"))
+    known = leak_known(
+        job.craft,
+        thrust_share=given["thrust_sigma"],
+        each_share=given["unlike"],
+        pulse_share=given["pulse_scatter"],
+        center_of_mass_m=None if center is None else numbers(center, "m", 3),
+        inertia_share=given["inertia_sigma"],
+        spin_share=given["spin_sigma"],
+        torque_Nm=None if torque is None else quantity(torque, "N m"),
+        torque_in_an_hour_Nm=None if walk is None else quantity(walk, "N m"),
     )
-    if follow:
-        _followed(watch, file, patience, lambda part: telemetry_from(part, channels, exclude, start, stop, ship)[0])
-        inputs = hashes(file, channels, exclude)
-    else:
-        telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
-        watch.take(telemetry, final=True)
-    result = watch.result()
-    if plot is not None:
-        from ..plots.leak import save_leak_figure
-
-        save_leak_figure(result, plot)
-        say(f"wrote {plot}")
-    if json:
-        options = {"craft": craft, "method": method, "false_alarms": false_alarms, "window": window, "momentum": momentum,
-                   "thrust": thrust, "thrust_sigma": thrust_sigma, "unlike": unlike, "pulse_scatter": pulse_scatter, "cm": cm,
-                   "cm_sigma": cm_sigma, "inertia": inertia, "inertia_sigma": inertia_sigma, "spin_sigma": spin_sigma,
-                   "torque_sigma": torque_sigma, "torque_walk": torque_walk, "start": start, "stop": stop, "follow": follow}  # fmt: skip
-        print_json({"command": "leak"} | result.record() | {"provenance": provenance(inputs | hashes(craft), options)})
-    else:
-        print(result)
-        print_doubts(result.doubts)
-    if result.alarm:
-        raise typer.Exit(3)
+    return LeakWatch(
+        job.craft,
+        method=given["method"],
+        false_alarms_per_hour=given["false_alarms"],
+        window_s=given["window"],
+        thrust_N=None if thrust is None else quantity(thrust, "N"),
+        momentum_Nms=given["momentum"],
+        known=known,
+    )
 
 
 def _followed(watch, file: Path, patience: float, read) -> None:

@@ -5,6 +5,7 @@ Exit codes: 0 done, 2 bad input or usage, 3 done but a check failed (alarm, watc
 
 from __future__ import annotations
 
+import itertools
 import os
 import sys
 
@@ -32,18 +33,18 @@ from . import (
 
 app = typer.Typer(help=__doc__, add_completion=False, rich_markup_mode=None)
 app.command("torque", short_help="Reconstruct the disturbance torque.")(torque.torque)
-app.command("wheels", short_help="Bearing drag of the wheels, and how they were used.")(wheels.wheels)
-app.command("external-torque", short_help="The steady external torque, from momentum gained.")(
+app.command("wheels", short_help="Bearing drag and use of the wheels.")(wheels.wheels)
+app.command("external-torque", short_help="The steady external torque, from the momentum gained.")(
     external_torque.external_torque
 )
 app.command("density", short_help="Density of the gas met in a flyby, from its torque.")(density.density)
-app.command("jets", short_help="Jets of a plume, from the momentum they gave.")(jets.jets)
+app.command("jets", short_help="Jets of a plume, from the momentum they transfer.")(jets.jets)
 app.command("leak", short_help="Leaking and weak thrusters, from residual momentum.")(leak.leak)
 app.command("thrust", short_help="Thrust, fall time and centre of mass, from wheel biasing and burns.")(thrust.thrust)
 app.command("simulate", short_help="Fly a scenario in the closed loop.")(simulate.simulate)
-app.command("budget", short_help="How wrong each method is, over many flights.")(budget.budget)
-app.command("tune", short_help="The papers' search for a smoothing span.")(tune.tune)
-app.command("demo", short_help="Fly the papers' cases and reconstruct them.")(demo.demo)
+app.command("budget", short_help="Error budget of each method over many flights.")(budget.budget)
+app.command("tune", short_help="The cover paper's search for a smoothing span.")(tune.tune)
+app.command("demo", short_help="Fly and reconstruct the test cases of the cover paper.")(demo.demo)
 app.command("report", short_help="One page for the anomaly board.")(report.report)
 app.add_typer(inertia.app, name="inertia", short_help="The inertia tensor and the external torque, from slews.")
 app.add_typer(trend.app, name="trend", short_help="An actuator's health over years: add, list, show, compare, watch.")
@@ -73,16 +74,16 @@ def main() -> None:
     try:
         code = app(standalone_mode=False, prog_name="asflown")
     except BadInput as why:
-        code = _complain(str(why))
+        code = _complain(str(why), told=why.record())
     except typer.Abort:
         code = 130
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 0
     except MemoryError:
-        code = _complain("there is not enough memory for this\nTake a shorter window or a shorter flight.")
+        code = _complain("there is not enough memory for this job\nTake a shorter window or a shorter flight.")
     except Exception as why:
-        if hasattr(why, "format_message"):  # the parser's own complaint about usage
+        if hasattr(why, "format_message"):  # usage error of the parser
             code = _complain(f"{why.format_message()}\nSee `{_verb(why)} --help`.")
         elif os.environ.get("ASFLOWN_DEBUG"):
             raise
@@ -93,14 +94,23 @@ def main() -> None:
 
 
 def _verb(usage) -> str:
-    """The command whose usage was wrong: 'asflown telemetry check'."""
+    """The command with the usage error: 'asflown telemetry check'."""
     context = getattr(usage, "ctx", None)
     words = context.command_path.split()[1:] if context else [w for w in sys.argv[1:2] if w.isalpha()]
     return " ".join(["asflown", *words])
 
 
-def _complain(text: str, code: int = 2) -> int:
+def _complain(text: str, code: int = 2, told: dict | None = None) -> int:
+    """One message on standard error; with --json also one object on standard output, so that a program need not parse words."""
     print(f"error: {text}"[:1490], file=sys.stderr)
+    if "--json" in sys.argv[1:]:
+        import json
+
+        what, _, remedy = text.partition("\n")
+        record = told or {"what": what, "remedy": remedy, "file": None, "channel": None, "time": None, "line": None}
+        words = itertools.takewhile(str.isidentifier, (w.replace("-", "_") for w in sys.argv[1:3]))
+        command = " ".join(w.replace("_", "-") for w in words)
+        sys.stdout.write(json.dumps({"command": command, "error": record, "exit_code": code}) + "\n")
     return code
 
 

@@ -12,11 +12,11 @@ INERTIA = typer.Option(
 )
 CM = typer.Option(None, "--cm", help='Centre of mass "x,y,z" in m, in the thruster positions\' origin.')
 CHANNELS = typer.Option(None, "--channels", help="Channel dictionary (TOML) for a table with other names and units.")
-EXCLUDE = typer.Option(None, "--exclude", help="Spans not to be used: CSV of start, stop, channel, reason.")
+EXCLUDE = typer.Option(None, "--exclude", help="Spans to exclude: CSV of start, stop, channel, reason.")
 START = typer.Option(None, "--start", help="Start of the window: seconds from the epoch, or UTC.")
 STOP = typer.Option(None, "--stop", help="End of the window: seconds from the epoch, or UTC.")
 KEEP_IN = typer.Option(None, "--store", help="Keep the result in a trend store: a path (SQLite) or a URL.")
-KEEP_AS = typer.Option(None, "--id", help="Its name in the store; the date unless given.")
+KEEP_AS = typer.Option(None, "--id", help="Name of the entry; made from the date unless given.")
 PLOT_DIR = typer.Option(None, "--plot-dir", help="Draw the figures into this folder (SVG).")
 UNLIKE = typer.Option(
     None, "--unlike", help="One sigma of one thruster against the others, as a share; 0.05 (leak: 0.03)."
@@ -49,14 +49,14 @@ def numbers_of(text: str, option: str) -> list[float]:
 
 
 def hashes(*files) -> dict[str, str]:
-    """SHA-256 of every file named, for the provenance; what is no file (a built-in name, None) is passed over."""
+    """SHA-256 of every file named, for the provenance; anything else (a built-in name, None) is skipped."""
     from ..kit.files import sha256_of
 
     return {str(f): sha256_of(Path(f).read_bytes()) for f in files if f is not None and Path(f).is_file()}
 
 
 def telemetry_from(file: Path, channels, exclude, start, stop, craft):
-    """Telemetry through the door, cut to the window.  Returns it and the inputs' SHA-256."""
+    """Telemetry, screened and cut to the window.  Returns it and the inputs' SHA-256."""
     from ..telemetry.load import load_telemetry
 
     whole = load_telemetry(file, channels=channels, exclude=exclude, craft=craft)
@@ -64,7 +64,7 @@ def telemetry_from(file: Path, channels, exclude, start, stop, craft):
 
 
 def check_picture(place: Path | None) -> None:
-    """Before the work: whether a picture can be drawn there (None: none is asked for)."""
+    """Check before the work that a picture can be written there (None: no picture)."""
     if place is not None:
         from ..kit.files import check_place
         from ..plots.figure import picture_kind

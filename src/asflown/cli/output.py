@@ -16,7 +16,7 @@ def print_json(record: dict) -> None:
 
 
 def provenance(inputs: dict[str, str], options: dict, seed=None) -> dict:
-    """Which files (name -> SHA-256), versions, options and seed made a result."""
+    """Files (name -> SHA-256), versions, options and seed that made a result."""
     from ..kit.result import Input
     from ..kit.result import provenance as told
 
@@ -29,21 +29,21 @@ def say(text: str = "") -> None:
 
 
 def keep(store: str, entry) -> None:
-    """An entry into a trend store, and what it is kept as."""
+    """Store an entry in a trend store, and report its name and revision."""
     from ..trends.store import TrendStore
 
     with TrendStore.open(store) as trends:
         kept = trends.add(entry)[0]
-    say(f"kept as {kept.event}, revision {kept.revision}")
+    say(f"stored as {kept.event}, revision {kept.revision}")
 
 
 def progress():
-    """``say`` for a person who waits; None where standard error is kept, so that an error stands there alone."""
+    """``say`` on a terminal; None where standard error is redirected, so that it has errors only."""
     return say if sys.stderr.isatty() else None
 
 
 def print_doubts(doubts) -> None:
-    """Doubts in words under every text result, the gravest first; suspect and void ones are marked."""
+    """Doubts under every text result, the gravest first; suspect and void ones are marked."""
     from ..kit.doubts import Doubts, doubt_mark
 
     for d in Doubts(doubts).gravest_first:
@@ -51,7 +51,7 @@ def print_doubts(doubts) -> None:
 
 
 def wrapped(head: str, text: str) -> str:
-    """A sentence behind its head, folded to the terminal; one line where a program reads it."""
+    """A sentence after its head, wrapped to the terminal; one line where the output is redirected."""
     if not sys.stdout.isatty():
         return head + text
     width = max(40, shutil.get_terminal_size().columns)

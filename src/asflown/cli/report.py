@@ -8,17 +8,17 @@ import typer
 
 from .options import JSON
 from .output import print_json, provenance, say, wrapped
-from .trend import LIMIT, WHOSE, without_password
+from .trend.store_options import LIMIT, WHOSE, without_password
 
 
 def report(
     store: str = typer.Argument(help="A trend store: a path (SQLite) or a URL."),
-    out: Path = typer.Option(..., "--out", help="The page (HTML); its JSON twin is written beside it."),
+    out: Path = typer.Option(..., "--out", help="The page (HTML); the same as JSON is written to the same folder."),
     craft: str = WHOSE,
     limit: list[str] = LIMIT,
     json: bool = JSON,
 ) -> None:
-    """Write one page for the anomaly board: verdict first, then trends, overlays, cold against warm, devices, provenance."""
+    """Write one page for the anomaly board: verdict, trends, overlays, cold and warm, devices, provenance."""
     from ..kit.errors import BadInput
     from ..kit.files import check_place
 

@@ -1,4 +1,4 @@
-"""Fly a scenario in the closed loop: telemetry as a spacecraft would send it, and the truth beside it."""
+"""The verb `simulate`."""
 
 from __future__ import annotations
 
@@ -6,15 +6,17 @@ from pathlib import Path
 
 import typer
 
-from .options import CM, INERTIA, JSON, craft_from, hashes
-from .output import print_doubts, print_json, progress, provenance
+from .job import Job
+from .options import CM, INERTIA, JSON
+from .output import progress
 
 
 def simulate(
+    context: typer.Context,
     scenario: str = typer.Argument(
         help="A shipped scenario (profile-1, cover-deploy, …), a mission (cassini-mission), or a TOML file."
     ),
-    out: Path = typer.Option(
+    folder: Path = typer.Option(
         ..., "--out", help="Directory for telemetry.csv, truth.csv and truth.json; of a mission, for events.toml."
     ),
     craft: str = typer.Option(None, "--craft", help="A built-in craft or a TOML file, instead of the scenario's."),
@@ -30,62 +32,52 @@ def simulate(
     """Fly a scenario in the closed loop: telemetry as a spacecraft would send it, and the truth beside it."""
     from ..kit.config import changes_of
     from ..kit.errors import BadInput
-    from ..kit.files import check_folder
+    from ..kit.result import inputs_of
     from ..sim.flight import fly, write_flight
     from ..sim.mission import is_mission
     from ..sim.scenario import load_scenario
 
-    check_folder(out)
-    options = {"craft": craft, "noise": noise, "set": settings, "inertia": inertia, "cm": cm}
+    job = Job(context)
     changes = changes_of(settings or (), "--set")
     if is_mission(scenario):
         if changes:
             raise BadInput(
                 "--set changes a scenario, and this is a mission", remedy="Copy its TOML and change it there."
             )
-        _simulate_mission(scenario, out, seed, options, json)
+        _simulate_mission(job, scenario, folder, seed, noise)
         return
     plan = load_scenario(scenario).changed(**changes)
-    vehicle = craft_from(craft or plan.craft, inertia, cm)
-    flight = fly(plan, craft=vehicle, seed=seed, noise=noise, progress=progress())
-    files = write_flight(flight, out)
-    if json:
-        print_json({
-            "command": "simulate",
-            "scenario": flight.scenario.name,
-            "files": files,
-            "seed": flight.seed,
-            "ended": flight.ended,
-            "doubts": list(flight.doubts),
-            "provenance": provenance(hashes(scenario, craft), options, flight.seed),
-        })  # fmt: skip
-        return
-    print(f"{flight.scenario.name}: {flight.ended} (seed {flight.seed}, noise {flight.scenario.noise})")
-    for path in files.values():
-        print(f"  {path}")
-    print_doubts(flight.doubts)
+    flight = fly(plan, craft=job.craft_named(craft or plan.craft), seed=seed, noise=noise, progress=progress())
+    files = write_flight(flight, folder)
+
+    def text() -> None:
+        print(f"{flight.scenario.name}: {flight.ended} (seed {flight.seed}, noise {flight.scenario.noise})")
+        for path in files.values():
+            print(f"  {path}")
+
+    record = {"scenario": flight.scenario.name, "files": files, "seed": flight.seed, "ended": flight.ended}
+    job.tell(
+        record, flight.doubts, text, inputs=inputs_of(scenario, craft), options={"set": settings}, seed=flight.seed
+    )
 
 
-def _simulate_mission(name: str, out: Path, seed: int | None, options: dict, json: bool) -> None:
+def _simulate_mission(job: Job, name: str, folder: Path, seed: int | None, noise: str | None) -> None:
+    from ..kit.doubts import Doubts, doubt_from
+    from ..kit.result import inputs_of
     from ..sim.mission import fly_mission, load_mission
 
-    mission = load_mission(name)
-    vehicle = craft_from(options["craft"] or mission.craft, options["inertia"], options["cm"])
-    done = fly_mission(mission, out, craft=vehicle, seed=seed, noise=options["noise"], progress=progress())
-    events, truth = out / "events.toml", out / "mission.json"
-    if json:
-        print_json({
-            "command": "simulate",
-            "mission": done["mission"],
-            "events": events,
-            "flown": done["flown"],
-            "listed": done["listed"],
-            "truth": truth,
-            "seed": done["seed"],
-            "doubts": done["doubts"],
-            "provenance": provenance(hashes(name, options["craft"]), options, done["seed"]),
-        })  # fmt: skip
-        return
-    counts = f"{done['flown']} flown of {done['listed']} listed"
-    print(f"{done['mission']}: {counts} (seed {done['seed']}, noise {done['noise']})\n  {events}\n  {truth}")
-    print_doubts(done["doubts"])
+    mission, craft = load_mission(name), job.given["craft"]
+    vehicle = job.craft_named(craft or mission.craft)
+    done = fly_mission(mission, folder, craft=vehicle, seed=seed, noise=noise, progress=progress())
+    events, truth = folder / "events.toml", folder / "mission.json"
+
+    def text() -> None:
+        counts = f"{done['flown']} flown of {done['listed']} listed"
+        print(f"{done['mission']}: {counts} (seed {done['seed']}, noise {done['noise']})\n  {events}\n  {truth}")
+
+    record = {
+        "mission": done["mission"], "events": events, "flown": done["flown"], "listed": done["listed"], "truth": truth,
+        "seed": done["seed"],
+    }  # fmt: skip
+    doubts = Doubts(doubt_from(dict(d)) for d in done["doubts_detail"])
+    job.tell(record, doubts, text, inputs=inputs_of(name, craft), options={"set": None}, seed=done["seed"])

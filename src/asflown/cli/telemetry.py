@@ -1,4 +1,4 @@
-"""Telemetry: check a file before believing it, list the channel names."""
+"""Telemetry: check a file before use, list the channel names."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ def check(
     file: Path = typer.Argument(help="CSV (plain or gzip), Parquet, NetCDF or HDF5."),
     channels: Path = CHANNELS,
     exclude: Path = EXCLUDE,
-    craft: str = typer.Option(None, "--craft", help="A craft, whose wheel rate limits sharpen the guard on units."),
+    craft: str = typer.Option(None, "--craft", help="A craft, to test wheel rates against its limits."),
     inertia: str = INERTIA,
     cm: str = CM,
     start: str = START,
     stop: str = STOP,
     json: bool = JSON,
 ) -> None:
-    """What a telemetry file holds, channel by channel, and what is wrong with it.
+    """Check a telemetry file channel by channel, and report what is wrong with it.
 
-    Exit code 3 where the data need a look before use: a doubted unit, spikes, a stuck sensor, an
-    undeclared wrap, quaternions not of length one, one time stamp with two different values.
-    Dropouts, gaps, repeats, duplicates and late samples are reported and respected, exit code 0."""
+    Exit code 3 where the data need inspection before use: a doubted unit, spikes, a stuck sensor, an
+    undeclared wrap, quaternions without unit length, one time stamp with two different values.
+    Dropouts, gaps, repeats, duplicates and late samples are reported and handled, exit code 0."""
     from ..telemetry.screening import needs_a_look, summaries
 
     ship = craft_from(craft, inertia, cm) if craft else None
@@ -50,6 +50,7 @@ def check(
 @app.command()
 def names(json: bool = JSON) -> None:
     """The channel names asflown knows, with their units."""
+    from ..kit.doubts import Doubts
     from ..telemetry.channels import AXES, KINDS
 
     members = {"axis": "|".join(AXES), "component": "w|x|y|z", "wheel": "<WHEEL>", "thruster": "<THRUSTER>"}
@@ -61,7 +62,7 @@ def names(json: bool = JSON) -> None:
         print_json({
             "command": "telemetry names",
             "names": [{"name": n, "unit": k.unit, "behaves": k.behaves, "meaning": k.meaning} for n, k in rows],
-            "doubts": [], "provenance": provenance({}, {}),
+            **Doubts().record(), "provenance": provenance({}, {}),
         })  # fmt: skip
         return
     for name, k in rows:
@@ -84,12 +85,12 @@ def _record(t, lines) -> dict:
             {"channel": f.channel, "what": f.what, "count": f.count, "first_s": float(t.seconds(f.first_tai_ns)),
              "detail": f.detail} for f in t.findings
         ],
-        "doubts": list(t.doubts),
+        **t.doubts.record(),
     }  # fmt: skip
 
 
 def _print(t, lines) -> None:
-    """One row a channel; then what was found in words, dropouts and gaps apart (they have their columns)."""
+    """One row a channel; then the findings in words, except dropouts and gaps (they have columns)."""
     first, last = t.span()
     print(
         f"{t.source}: {len(lines)} channels, epoch {t.epoch_label}, {float(t.seconds(first)):g} to {float(t.seconds(last)):g} s"

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import typer
 
+from .job import Job
 from .options import (
     CHANNELS,
     CM,
@@ -20,26 +21,24 @@ from .options import (
     START,
     STOP,
     UNLIKE,
-    check_picture,
-    craft_from,
-    hashes,
-    telemetry_from,
 )
-from .output import keep, print_doubts, print_json, provenance, say
 
 
 def thrust(
+    context: typer.Context,
     files: list[Path] = typer.Argument(
         help="Telemetry of one event, or of several together: CSV, Parquet, NetCDF or HDF5."
     ),
     craft: str = CRAFT,
     method: str = typer.Option(
-        "joint", "--method", help="joint, printed (001 eqs 14-23) or accelerometer (001 Appendix D)."
+        "joint", "--method", help="joint, printed (Feldman & Lee eqs 14-23) or accelerometer (their Appendix D)."
     ),
     variant: str = typer.Option(
         "corrected", "--variant", help="Pulse formula of printed and accelerometer: corrected, or printed."
     ),
-    fall_time: str = typer.Option(None, "--fall-time", help="Fall time taken beforehand; the craft's, 65 ms."),
+    fall_time: str = typer.Option(
+        None, "--fall-time", help="Fall time assumed beforehand; by default the craft's, 65 ms."
+    ),
     fall_sigma: str = typer.Option("13 ms", "--fall-sigma", help="Its sigma."),
     cm: str = CM,
     cm_sigma: str = typer.Option(
@@ -68,10 +67,14 @@ def thrust(
     from ..estimate.thrust import thrust as thrust_of
     from ..kit.quantities import numbers, quantity
 
-    check_picture(plot)
-    ship = craft_from(craft, inertia, cm)
+    def entry(result, name):
+        from ..trends.entries import thrust_entry
+
+        return thrust_entry(result, telemetry[0], job.craft, name)
+
+    job = Job(context)
     priors = priors_for(
-        ship,
+        job.craft,
         fall_s=None if fall_time is None else quantity(fall_time, "s"),
         fall_sigma_s=quantity(fall_sigma, "s"),
         center_sigma_m=None if cm_sigma is None else numbers(cm_sigma, "m", 3),
@@ -82,26 +85,6 @@ def thrust(
         mass_kg=None if mass is None else quantity(mass, "kg"),
         mass_share=mass_sigma,
     )
-    read = [telemetry_from(f, channels, exclude, start, stop, ship) for f in files]
-    telemetry = [t for t, _ in read]
-    inputs = {k: v for _, found in read for k, v in found.items()}
-    result = thrust_of(telemetry, ship, method=method, variant=variant, priors=priors)
-    options = {"craft": craft, "method": method, "variant": variant, "fall_time": fall_time, "fall_sigma": fall_sigma, "cm": cm,
-               "cm_sigma": cm_sigma, "pulse_scatter": pulse_scatter, "unlike": unlike, "spin_sigma": spin_sigma,
-               "inertia_sigma": inertia_sigma, "mass": mass, "mass_sigma": mass_sigma, "start": start, "stop": stop,
-               "inertia": inertia}  # fmt: skip
-    origin = provenance(inputs | hashes(craft), options)
-    if store is not None:
-        from ..trends.entries import thrust_entry
-
-        keep(store, thrust_entry(result, telemetry[0], ship, name, origin))
-    if plot is not None:
-        from ..plots.thrust import save_thrust_figure
-
-        save_thrust_figure(result, plot)
-        say(f"wrote {plot}")
-    if json:
-        print_json({"command": "thrust"} | result.record() | {"provenance": origin})
-        return
-    print(result)
-    print_doubts(result.doubts)
+    telemetry = [job.telemetry(f) for f in files]
+    result = thrust_of(telemetry, job.craft, method=method, variant=variant, priors=priors)
+    job.finish(result, entry=entry)

@@ -2,54 +2,52 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
-from .options import (
-    CHANNELS,
-    CM,
-    CRAFT,
-    EXCLUDE,
-    INERTIA,
-    JSON,
-    START,
-    STOP,
-    check_picture,
-    craft_from,
-    hashes,
-    telemetry_from,
-)
-from .output import print_doubts, print_json, provenance, say
+from .job import Job
+from .options import CHANNELS, CM, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP
+from .output import say
+
+if TYPE_CHECKING:
+    from ..estimate.torque import TorqueResult
 
 
 def torque(
+    context: typer.Context,
     file: Path = typer.Argument(help="Telemetry: CSV (plain or gzip), Parquet, NetCDF or HDF5."),
     craft: str = CRAFT,
     method: str = typer.Option(
-        None, "--method", help="fused (default), momentum, transfer or polynomial; --variant printed: momentum."
+        None,
+        "--method",
+        help="fused (default), momentum, transfer, polynomial or on-times; --variant printed: momentum.",
     ),
     variant: str = typer.Option(
-        "corrected", "--variant", help="corrected, or printed: the papers' way, faults included."
+        "corrected", "--variant", help="corrected, or printed: the papers' method with its errors."
     ),
     axis: str = typer.Option("all", "--axis", help="x, y, z or all (body axes)."),
-    model: str = typer.Option(None, "--model", help="Loop model of the transfer method: low, hankel or full."),
-    order: int = typer.Option(12, "--order", help="Order of the polynomial method: 6, 12, 15 or 18."),
+    model: str = typer.Option(
+        None, "--model", help="Loop model of the transfer and polynomial methods: low, hankel or full (transfer)."
+    ),
+    order: int = typer.Option(None, "--order", help="Order of the polynomial method: 6, 12 (default), 15 or 18."),
     window: float = typer.Option(
-        None, "--window", help="Full width of the local fits [s], in place of the studied one."
+        None, "--window", help="Full width of the local fits of momentum and transfer [s], in place of the studied one."
     ),
     prior: str = typer.Option(
         None, "--prior", help="Torque of the fused method: edges (default: lines with corners), matern or wiener."
     ),
     loop: str = typer.Option(
-        None, "--loop", help="Controller of the fused method: modelled, or measured by what the actuators did."
+        None, "--loop", help="Controller of the fused method: modelled, or measured by the actuators' action."
     ),
     consider: str = typer.Option(
-        None, "--consider", help='One sigma of what is taken as known, as in "inertia=0.03,delay_s=0.2" (fused).'
+        None, "--consider", help='One sigma of what the fused method takes as known, as in "inertia=0.03,delay_s=0.2".'
     ),
     impulse: str = typer.Option(None, "--impulse", help='Angular impulse between two times [s], as in "60,141".'),
     moving: str = typer.Option("auto", "--moving", help="Mechanism whose inertia is taken off: a name, none, or auto."),
-    compare: bool = typer.Option(False, "--compare", help="Set the other methods beside the chosen one."),
+    compare: bool = typer.Option(False, "--compare", help="Compare the other methods with the chosen one."),
     start: str = START,
     stop: str = STOP,
     channels: Path = CHANNELS,
@@ -63,66 +61,40 @@ def torque(
     """Reconstruct the disturbance torque on the body from telemetry."""
     from rich.console import Console
 
-    from ..estimate.torque import compare_torques, disturbance_torque
-    from ..kit.files import check_place
+    from ..estimate.torque import method_called, torque_comparison
+    from ..estimate.torque import torque as torque_by
 
-    if out is not None:
-        check_place(out)
-    check_picture(plot)
-    ship = craft_from(craft, inertia, cm)
-    telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
+    job = Job(context)
+    chosen = method_called(
+        method,
+        variant=variant,
+        model=model,
+        order=order,
+        window_s=window,
+        prior=prior,
+        loop=loop,
+        considered=_sigmas(consider),
+    )
+    telemetry, craft_then = job.telemetry(), job.craft
     if impulse is not None:  # before the work; the torque's own span may be shorter, and is asked again
         _span_of(impulse, *telemetry.seconds(telemetry.span()))
     mechanism = None if moving == "none" else moving
-    considered = _sigmas(consider)
     # seconds for an event, minutes for an orbit at 1 Hz: say that something happens, to a terminal only
     with Console(stderr=True).status("fitting and smoothing", spinner="line"):
-        result = disturbance_torque(
-            telemetry,
-            ship,
-            method=method,
-            variant=variant,
-            axis=axis,
-            model=model,
-            order=order,
-            window_s=window,
-            prior=prior,
-            loop=loop,
-            considered=considered,
-            moving=mechanism,
-        )
+        result = torque_by(telemetry, craft_then, method=chosen, axis=axis, moving=mechanism)
     if impulse is not None:
         result = _with_impulse(result, impulse)
-    comparisons, others = [], []
+    comparisons = []
     if compare:
-        others = _others(telemetry, ship, result, mechanism)
-        comparisons = [compare_torques(result, o, "xyz"[j]) for o in others for j in result.axes]
-    options = {
-        "craft": craft, "method": result.method, "variant": variant, "axis": axis, "model": model, "order": order, "window_s": window, "prior": prior,
-        "loop": loop, "consider": consider, "impulse": impulse, "moving": moving, "start": start, "stop": stop, "inertia": inertia, "cm": cm,
-    }  # fmt: skip
-    origin = provenance(inputs | hashes(craft), options)
-    if out is not None:
-        from ..estimate.torque import save_csv
-
-        save_csv(result, out, origin)
-    if plot is not None:
-        from ..plots.torque import save_torque_figure
-
-        save_torque_figure([result, *others], plot)
-    for written in (out, plot):
-        if written is not None:
-            say(f"wrote {written}")
-    if json:
-        record = {"command": "torque"} | result.record() | {"provenance": origin}
-        if compare:
-            record["comparison"] = [c.record() for c in comparisons]
-        print_json(record)
-        return
-    print(result)
-    for c in comparisons:
-        print(c)
-    print_doubts(result.doubts)
+        others = _others(telemetry, craft_then, result, mechanism)
+        result = replace(result, compared=tuple(others))
+        comparisons = [torque_comparison(result, o, "xyz"[j]) for o in others for j in result.axes]
+    job.finish(
+        result,
+        options={"method": result.method},
+        more={"comparison": [c.record() for c in comparisons]} if compare else None,
+        text=lambda: print(*comparisons, sep="\n") if comparisons else None,
+    )
 
 
 def _sigmas(text: str | None) -> dict[str, float] | None:
@@ -157,17 +129,15 @@ def _span_of(text: str, first_s: float, last_s: float) -> tuple[float, float]:
     return span[0], span[1]
 
 
-def _with_impulse(result, text: str):
+def _with_impulse(result: TorqueResult, text: str) -> TorqueResult:
     """The result with the angular impulse of a span about every axis asked for."""
-    from dataclasses import replace
-
     span = _span_of(text, result.time_s[0], result.time_s[-1])
-    return replace(result, impulses=tuple((*span, "xyz"[j], *result.impulse(*span, "xyz"[j])) for j in result.axes))
+    return result.with_impulse(*span)
 
 
-def _others(telemetry, ship, result, mechanism):
+def _others(telemetry, craft, result: TorqueResult, mechanism: str | None) -> list[TorqueResult]:
     """Every other method and variant that this telemetry allows."""
-    from ..estimate.torque import disturbance_torque
+    from ..estimate.torque import torque as torque_by
     from ..kit.errors import BadInput
 
     found = []
@@ -177,7 +147,7 @@ def _others(telemetry, ship, result, mechanism):
             continue
         try:
             found.append(
-                disturbance_torque(telemetry, ship, method=method, variant=variant, axis=result.axis, moving=mechanism)
+                torque_by(telemetry, craft, method=method, variant=variant, axis=result.axis, moving=mechanism)
             )
         except BadInput as why:
             say(f"not compared, {method} {variant}: {str(why).splitlines()[0]}")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import typer
 
-from .options import CM, CRAFT, INERTIA, JSON, craft_from, hashes, numbers_of
-from .output import print_doubts, print_json, provenance
+from .job import Job
+from .options import CM, CRAFT, INERTIA, JSON, numbers_of
 
 
 def tune(
+    context: typer.Context,
     spans: str = typer.Option(None, "--spans", help='Shares of the record to try, as in "0.04,0.08,0.12".'),
     widths: str = typer.Option("30,15", "--widths", help="Rises of the injected triangles [s]."),
     noise: str = typer.Option("none", "--noise", help="none, half, nominal or double."),
@@ -19,32 +20,10 @@ def tune(
     json: bool = JSON,
 ) -> None:
     """Search the printed method's smoothing span as the paper did, and show what the best one balances."""
-    from ..campaigns.tune import SPANS, best_of, remarks, tune
+    from ..campaigns.tune import SPANS, tune
 
-    ship = craft_from(craft, inertia, cm)
+    job = Job(context)
     rises = numbers_of(widths, "--widths")
     shares = numbers_of(spans, "--spans") if spans else list(SPANS)
-    rows = tune(ship, rises=rises, spans=shares, runs=runs, noise=noise)
-    best, said = best_of(rows), remarks(rows)
-    if json:
-        options = {
-            "spans": shares,
-            "widths_s": rises,
-            "noise": noise,
-            "runs": runs,
-            "craft": craft,
-            "inertia": inertia,
-            "cm": cm,
-        }
-        print_json({"command": "tune", "rises_s": rises, "rows": [r.record() for r in rows], "best_span": best.span,
-                    "doubts": said, "provenance": provenance(hashes(craft), options, 0)})  # fmt: skip
-        return
-    print("mean error at the peaks [%]: as printed (smoothing alone, with I w put back), per rise of the triangles")
-    print("   span  samples   " + "".join(f"{f'{r:g} s':>22s}" for r in rises) + "     rms [mN m]")
-    for r in rows:
-        cells = "".join(
-            f"{a:+12.1f} ({b:+6.1f})" for a, b in zip(r.peak_error_percent, r.smoothing_percent, strict=True)
-        )
-        print(f"  {r.span:5.0%} {'/'.join(str(n) for n in dict.fromkeys(r.samples)):>8s}   {cells}     {', '.join(f'{1e3 * v:.2f}' for v in r.rms_Nm)}"
-              + ("   <- least" if r is best else ""))  # fmt: skip
-    print_doubts(said)
+    result = tune(job.craft, rises=rises, spans=shares, runs=runs, noise=noise)
+    job.finish(result, options={"spans": shares, "widths_s": rises})

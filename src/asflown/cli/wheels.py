@@ -6,24 +6,12 @@ from pathlib import Path
 
 import typer
 
-from .options import (
-    CHANNELS,
-    CRAFT,
-    EXCLUDE,
-    JSON,
-    KEEP_AS,
-    KEEP_IN,
-    START,
-    STOP,
-    check_picture,
-    craft_from,
-    hashes,
-    telemetry_from,
-)
-from .output import keep, print_doubts, print_json, provenance, say
+from .job import Job
+from .options import CHANNELS, CRAFT, EXCLUDE, JSON, KEEP_AS, KEEP_IN, START, STOP
 
 
 def wheels(
+    context: typer.Context,
     file: Path = typer.Argument(help="Telemetry: CSV (plain or gzip), Parquet, NetCDF or HDF5."),
     craft: str = CRAFT,
     run_down: str = typer.Option(
@@ -40,28 +28,16 @@ def wheels(
     json: bool = JSON,
 ) -> None:
     """Bearing drag of every wheel, drag spikes, dwell at low speed, zero crossings and revolutions."""
-    from ..estimate.wheels import wheel_drag
+    from ..estimate.wheels import wheels as drag_of_wheels
     from ..kit.quantities import quantity
 
-    check_picture(plot)
-    ship = craft_from(craft, None, None)
-    low = quantity(low_speed, "rad/s")
-    telemetry, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
-    named = () if run_down is None else tuple(n.strip() for n in run_down.split(","))
-    result = wheel_drag(telemetry, ship, low_speed=low, run_down=named)
-    options = {"craft": craft, "run_down": run_down, "low_speed": low_speed, "start": start, "stop": stop}
-    origin = provenance(inputs | hashes(craft), options)
-    if store is not None:
+    def entry(result, name):
         from ..trends.entries import wheel_entry
 
-        keep(store, wheel_entry(result, telemetry, ship, name, origin))
-    if plot is not None:
-        from ..plots.wheels import save_wheels_figure
+        return wheel_entry(result, telemetry, job.craft, name)
 
-        save_wheels_figure(result, plot)
-        say(f"wrote {plot}")
-    if json:
-        print_json({"command": "wheels"} | result.record() | {"provenance": origin})
-        return
-    print(result)
-    print_doubts(result.doubts)
+    job = Job(context)
+    low = quantity(low_speed, "rad/s")
+    named = () if run_down is None else tuple(n.strip() for n in run_down.split(","))
+    telemetry = job.telemetry()
+    job.finish(drag_of_wheels(telemetry, job.craft, low_speed_rad_s=low, run_down=named), entry=entry)

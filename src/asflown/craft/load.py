@@ -12,6 +12,13 @@ from .model import Craft
 
 
 def built_in_crafts() -> list[str]:
+    """Names of the built-in crafts.
+
+    Returns
+    -------
+    list of str
+        In alphabetical order, as ``load_craft`` takes them.
+    """
     return sorted(p.name.removesuffix(".toml") for p in _profiles().iterdir() if p.name.endswith(".toml"))
 
 
@@ -20,11 +27,27 @@ def _profiles():
 
 
 def load_craft(name_or_file: str | Path, *, inertia=None, cm=None) -> Craft:
-    """A built-in craft ('cassini'), an alternative of it ('cassini@001-rounded'), or a TOML file.
+    """Load a built-in craft, or one from a TOML file.
 
-    ``inertia``: six elements Ixx, Iyy, Izz, Ixy, Ixz, Iyz [kg m2] used as given in place of the
-    craft's history; ``cm``: centre of mass [m] in the thruster positions' origin.
-    Raises BadInput for an unknown name, an unreadable file, an unknown key or a wrong unit.
+    Parameters
+    ----------
+    name_or_file : str or Path
+        A built-in craft ('cassini'), an alternative of it ('cassini@001-rounded'), or a TOML file (docs/craft.md).
+    inertia : sequence of 6 floats, optional
+        Ixx, Iyy, Izz, Ixy, Ixz, Iyz [kg m2], tensor elements (not negated products), body axes about the centre of mass;
+        used at all dates in place of the craft's history.
+    cm : sequence of 3 floats, optional
+        Centre of mass [m], in the origin of the thrusters' positions.
+
+    Returns
+    -------
+    Craft
+        Validated, in SI; ``at`` gives it on a date.
+
+    Raises
+    ------
+    BadInput
+        For an unknown name, an unreadable file, an unknown key, a wrong unit, or an impossible inertia.
     """
     text, name, alternative = str(name_or_file), str(name_or_file), ""
     path = Path(text)

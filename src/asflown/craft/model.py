@@ -18,7 +18,7 @@ from ..kit.doubts import Doubt, Doubts, Kind, Severity
 from ..kit.errors import BadInput, some_of
 from ..kit.quantities import numbers, quantity
 from ..kit.result import Input
-from ..kit.timeline import utc_label, utc_to_tai_ns
+from ..kit.timeline import NS, utc_label, utc_to_tai_ns
 
 
 def _in(unit: str, count: int = 0) -> Any:
@@ -48,7 +48,7 @@ if TYPE_CHECKING:  # what the values are once loaded
     ModeCoupling = tuple[float, float, float]
     InertiaElements = tuple[float, float, float, float, float, float]
     InertiaRatio = tuple[float, float, float, float, float, float]
-else:  # how they are written
+else:  # how they are written in TOML
     Kilogram, Second, Newton, Hertz, Pascal = _in("kg"), _in("s"), _in("N"), _in("Hz"), _in("Pa")
     KilogramMetre2, NewtonMetre, NewtonMetreSecond = _in("kg m2"), _in("N m"), _in("N m s")
     Radian, RadianPerSecond, ViscousDrag = _in("rad"), _in("rad/s"), _in("N m s / rad")
@@ -62,7 +62,7 @@ def _spin_inertia(value):
         return None
     inertia = quantity(value, "kg m2")
     if inertia <= 0:
-        raise ValueError(f"{value!r} is not positive; the sense of rotation is that of the axis")
+        raise ValueError(f"{value!r} is not positive; the sign of rotation belongs to the axis")
     return inertia
 
 
@@ -83,15 +83,18 @@ def tensor(elements) -> np.ndarray:
 
 
 def check_inertia(I_B: np.ndarray, what: str) -> None:
-    """Refuse a tensor no body can have: positive definite, and the triangle inequality."""
+    """Refuse a tensor that no rigid body can have: it must be positive definite and satisfy the triangle inequality."""
     w = np.linalg.eigvalsh(I_B)
     if w[0] <= 0 or w[0] + w[1] < w[2] * (1 - 1e-9):
         raise BadInput(
             f"{what}: no rigid body has this inertia (principal moments {w[0]:.6g}, {w[1]:.6g}, {w[2]:.6g} kg m2)",
-            remedy="Moments must be positive and no one larger than the sum of the other two. The order is "
+            remedy="Principal moments must be positive, and none larger than the sum of the other two. The order is "
             "Ixx, Iyy, Izz, Ixy, Ixz, Iyz in kg m2, tensor elements (not negated products of inertia).",
         )
 
+
+#: What is known of a craft, from longer before or after than this, is doubted: assumed. [ns]
+STALE_NS = 200 * 86_400 * NS
 
 STATED = Kind("craft.stated", Severity.CAUTION, "{sentence}")  # a doubt that the craft's file itself states
 INTERPOLATED = Kind(
@@ -101,8 +104,8 @@ INTERPOLATED = Kind(
 )  # fmt: skip
 NEAREST = Kind(
     "craft.inertia-nearest", Severity.CAUTION,
-    "the inertia is that of {date}, the nearest date known for this configuration",
-    "Give the inertia of the date: --inertia.",
+    "the inertia is that of {date}, the nearest known date of this configuration",
+    "Give the inertia on the date of the telemetry: --inertia.",
 )  # fmt: skip
 
 
@@ -115,12 +118,12 @@ class _Data(BaseModel):
 
 
 class MassProperties(_Data):
-    """The inertia tensor at one date.  Entries of one ``piece`` may be interpolated between."""
+    """The inertia tensor on one date.  Entries of the same ``piece`` are interpolated."""
 
     date: Date
     piece: str
     inertia: InertiaElements | None = None
-    inertia_per_spin_inertia: InertiaRatio | None = None  # where only the ratio to the wheels' is known
+    inertia_per_spin_inertia: InertiaRatio | None = None  # where only the ratio to the wheels' spin inertia is known
     basis: Literal["estimated", "predicted", "extrapolated", "inferred", "assumed"] = "estimated"
     mass: Kilogram | None = None
     source: str = ""
@@ -153,7 +156,7 @@ class PropellantUsed(_Data):
 
 
 class Drag(_Data):
-    """A wheel's bearing drag.  Assumed values unless a source says otherwise."""
+    """A wheel's bearing drag.  Values are assumed unless a source is given."""
 
     viscous: ViscousDrag = 0.0
     coulomb: NewtonMetre = 0.0
@@ -200,7 +203,7 @@ class Thruster(_Data):
 
 
 class ThrustHistory(_Data):
-    """Thrust at one date.  Entries of one ``piece`` are interpolated between; at a recharge of the tank a new one begins."""
+    """Thrust on one date.  Entries of the same ``piece`` are interpolated; a recharge of the tank begins a new piece."""
 
     date: Date
     thrust: Newton
@@ -209,7 +212,7 @@ class ThrustHistory(_Data):
 
 
 class BlowDown(_Data):
-    """A tank without a regulator: thrust goes as its pressure to a power."""
+    """A tank without a regulator: thrust is proportional to a power of its pressure."""
 
     thrust: Newton = Field(gt=0)
     pressure: Pascal = Field(gt=0)
@@ -217,7 +220,7 @@ class BlowDown(_Data):
     source: str = ""
 
     def pressure_at(self, thrust_N: float) -> float:
-        """Of the tank where each thruster gives that thrust. [Pa]"""
+        """Tank pressure at that thrust of each thruster. [Pa]"""
         return self.pressure * (thrust_N / self.thrust) ** (1 / self.exponent)
 
 
@@ -241,7 +244,7 @@ class RateFilter(_Data):
 
 
 class WheelController(_Data):
-    """Proportional-derivative control on filtered rate (000 eqs 12, 13; see dynamics.loop)."""
+    """Proportional-derivative control on filtered rate (cover paper eqs 12, 13; see dynamics.loop)."""
 
     bandwidth: Hertz = Field(gt=0)
     damping: float = Field(gt=0)
@@ -254,7 +257,7 @@ class WheelController(_Data):
 
     @property
     def kp_per_s(self) -> float:
-        """KP = wn / (2 zn), with the loop's own damping (000 eq 12 prints the filter's symbol)."""
+        """KP = wn / (2 zn), with the loop's own damping (cover paper eq 12 prints the filter's symbol)."""
         return self.natural_frequency_rad_s / (2 * self.damping)
 
     @property
@@ -277,7 +280,7 @@ class Mechanism(_Data):
     assumptions: tuple[str, ...] = ()
 
     def inertia_about_craft(self) -> np.ndarray:
-        """Its part of the craft's tensor: I_own + m (L.L 1 - L L^T)  (braces of 000 eqs 4a-c)."""
+        """Its part of the craft's tensor: I_own + m (L.L 1 - L L^T)  (braces of cover paper eqs 4a-c)."""
         L = np.array(self.from_cm, float)
         return tensor(self.inertia) + self.mass * (L @ L * np.eye(3) - np.outer(L, L))
 
@@ -296,7 +299,7 @@ class Pendulum(_Data):
     """Propellant that sloshes: a mass on a rod, held to the middle by surface tension."""
 
     name: str
-    mass: Kilogram = Field(gt=0)  # what swings of it
+    mass: Kilogram = Field(gt=0)  # of the swinging part
     pivot: MetreVector  # from the craft's centre of mass
     direction: Direction  # from the pivot to the mass at rest
     length: Metre = Field(gt=0)
@@ -307,7 +310,7 @@ class Pendulum(_Data):
     @model_validator(mode="after")
     def _directed(self):
         if np.linalg.norm(self.direction) == 0:
-            raise ValueError(f"slosh {self.name!r}: the direction has no length")
+            raise ValueError(f"slosh {self.name!r}: the direction must not be zero")
         return self
 
 
@@ -318,9 +321,9 @@ class Accelerometer(_Data):
 
 
 class Aerodynamics(_Data):
-    """Drag of a thin gas (004 eq 21) in the attitude of one ``flyby``; ``moment_arm`` about ``axis``.
+    """Drag of a thin gas (plume paper eq 21) in the attitude of one ``flyby``; ``moment_arm`` about ``axis``.
 
-    ``scale_sigma``: one sigma of C_D V^2 area arm together, as a share."""
+    ``scale_sigma``: one sigma of the product C_D V^2 area arm, as a share."""
 
     drag_coefficient: float = Field(gt=0)
     drag_coefficient_sigma: float = Field(ge=0)
@@ -333,7 +336,7 @@ class Aerodynamics(_Data):
 
 
 class Alternative(_Data):
-    """A named set of other values found in print."""
+    """A named set of other published values."""
 
     spin_inertia: dict[str, SpinInertia] = Field(default_factory=dict)
     inertia: InertiaElements | None = None  # in place of all history
@@ -341,7 +344,7 @@ class Alternative(_Data):
 
 
 class Craft(_Data):
-    """A whole vehicle.  ``at(date)`` gives it as it was on a day."""
+    """A spacecraft.  ``at(date)`` gives it as it was on a date."""
 
     name: str
     description: str = ""
@@ -360,7 +363,7 @@ class Craft(_Data):
     accelerometer: Accelerometer | None = None
     aerodynamics: Aerodynamics | None = None
     center_of_mass: MetreVector | None = None
-    center_of_mass_assumed: MetreVector | None = None  # a likely place, where none is known
+    center_of_mass_assumed: MetreVector | None = None  # assumed, where none is known
     alternatives: dict[str, Alternative] = Field(default_factory=dict)
 
     _inputs: tuple[Input, ...] = PrivateAttr(default=())
@@ -380,21 +383,22 @@ class Craft(_Data):
             spans = sorted(_service(w) for w in self.wheels if w.name == name)
             if any(a[1] > b[0] for a, b in pairwise(spans)):
                 raise ValueError(
-                    f"wheel {name!r} is described twice for one date: part them by valid_from and valid_to"
+                    f"wheel {name!r} is described twice for one date: separate the entries by valid_from and valid_to"
                 )
         if self.thruster_controller is not None:
             used = {n for pair in self.thruster_controller.pairs.values() for n in pair} | {
                 *self.thruster_controller.burn
             }
             if unknown := used - {t.name for t in self.thrusters}:
-                raise ValueError(f"thruster_controller names {some_of(unknown)}, which is no thruster")
+                raise ValueError(f"thruster_controller names {some_of(unknown)}, which is not a thruster")
         relative = {w.spin_inertia is None for w in self.wheels}
         if len(relative) > 1:
-            raise ValueError("either every wheel's spin inertia is known or none is")
+            raise ValueError("give the spin inertia of every wheel or of none")
         return self
 
     @property
     def wheel_names(self) -> list[str]:
+        """Names of all wheels, each once, in the order of the file."""
         return list(dict.fromkeys(w.name for w in self.wheels))
 
     @property
@@ -411,6 +415,13 @@ class Craft(_Data):
         return float(x), float(y), float(z)
 
     def mechanism(self, name: str) -> Mechanism:
+        """The mechanism of that name.
+
+        Raises
+        ------
+        BadInput
+            Where there is none.
+        """
         for m in self.mechanisms:
             if m.name == name:
                 return m
@@ -420,6 +431,22 @@ class Craft(_Data):
         )
 
     def with_alternative(self, name: str) -> Craft:
+        """The craft with a named set of other published values.
+
+        Parameters
+        ----------
+        name : str
+            A key of ``alternatives``.
+
+        Returns
+        -------
+        Craft
+
+        Raises
+        ------
+        BadInput
+            Where the craft has no such alternative.
+        """
         if name not in self.alternatives:
             raise BadInput(f"{self.name} has no alternative {name!r}", remedy=f"It has: {some_of(self.alternatives)}.")
         other, inertia = self.alternatives[name].spin_inertia, self.alternatives[name].inertia
@@ -427,7 +454,24 @@ class Craft(_Data):
         return self.model_copy(update={"wheels": wheels}).with_inertia(inertia)
 
     def with_inertia(self, elements, cm=None) -> Craft:
-        """The same craft with one tensor for all dates, used as given."""
+        """The craft with one inertia tensor for all dates, and another centre of mass.
+
+        Parameters
+        ----------
+        elements : sequence of 6 floats or None
+            Ixx, Iyy, Izz, Ixy, Ixz, Iyz [kg m2], tensor elements; None keeps the craft's history.
+        cm : sequence of 3 floats, optional
+            Centre of mass [m], in the origin of the thrusters' positions.
+
+        Returns
+        -------
+        Craft
+
+        Raises
+        ------
+        BadInput
+            For a tensor that no rigid body can have.
+        """
         changes: dict = {}
         if elements is not None:
             given = MassProperties.model_construct(
@@ -441,24 +485,51 @@ class Craft(_Data):
         return self.model_copy(update=changes)
 
     def thrust_at(self, tai_ns: int) -> float:
-        """Steady thrust of each thruster as predicted for a date: straight lines in time within a piece, held outside. [N]
+        """Predicted steady thrust of each thruster on a date: linear in time within a piece, constant outside.
 
-        Raises BadInput for a craft whose thrust is nowhere given."""
+        Parameters
+        ----------
+        tai_ns : int
+            The date, ns TAI.
+
+        Returns
+        -------
+        float
+            [N]
+
+        Raises
+        ------
+        BadInput
+            For a craft without a thrust history.
+        """
         known = sorted(self.thrust_history, key=lambda h: h.date)
         if not known:
             raise BadInput(
                 f"the thrust of {self.name} is not known",
-                remedy="Give its file a [[thrust_history]], or say the thrust.",
+                remedy="Add a [[thrust_history]] to its file, or give the thrust.",
             )
         begun = [h for h in known if h.date <= tai_ns] or known[:1]
         piece = [h for h in known if h.piece == begun[-1].piece]
         return float(np.interp(float(tai_ns), [float(h.date) for h in piece], [h.thrust for h in piece]))
 
     def believed_thrust(self, tai_ns: int | None) -> float:
-        """Thrust of each thruster that an estimate starts from: the history's on the date (None: its latest), or the mean
-        of the nominal ones where there is no history. [N]
+        """Thrust of each thruster assumed before an estimate: that of the history, else the mean nominal thrust.
 
-        Raises BadInput for a craft without thrusters."""
+        Parameters
+        ----------
+        tai_ns : int or None
+            The date, ns TAI; None: the latest of the history.
+
+        Returns
+        -------
+        float
+            [N]
+
+        Raises
+        ------
+        BadInput
+            For a craft without thrusters.
+        """
         if self.thrust_history:
             return self.thrust_at(max(h.date for h in self.thrust_history) if tai_ns is None else tai_ns)
         if not self.thrusters:
@@ -468,7 +539,18 @@ class Craft(_Data):
         return float(np.mean([t.nominal_thrust for t in self.thrusters]))
 
     def at(self, tai_ns: int | None) -> CraftAt:
-        """The craft on a date (None: the latest known state)."""
+        """The craft on a date.
+
+        Parameters
+        ----------
+        tai_ns : int or None
+            The date, ns TAI; None: the latest known state.
+
+        Returns
+        -------
+        CraftAt
+            Inertia tensor (interpolated, (3, 3) [kg m2]), wheels in service, and doubts about them.
+        """
         doubts: list[Doubt] = []
         moment = tai_ns if tai_ns is not None else max((m.date for m in self.mass_properties), default=0)
         wheels = [w for w in self.wheels if w.serves_at(moment)] if tai_ns is not None else _latest(self.wheels)
@@ -497,12 +579,12 @@ class Craft(_Data):
             I_B = tensor(a.elements)
             if a.doubt:
                 doubts.append(STATED(sentence=a.doubt))
-            if abs(moment - a.date) > 200 * 86_400 * 10**9:
+            if abs(moment - a.date) > STALE_NS:
                 doubts.append(NEAREST(date=_day(a.date)))
         return I_B, a.inertia is None
 
     def _fraction(self, start: int, stop: int, moment: int) -> tuple[float, str]:
-        """How far between two dates: by propellant used where the ledger covers them, else by date."""
+        """Fraction of the way between two dates: by propellant used where the ledger covers them, else by date."""
         ledger = sorted(self.propellant, key=lambda p: p.date)
         if ledger and ledger[0].date <= start and stop <= ledger[-1].date:
             dates, used = [p.date for p in ledger], [p.used for p in ledger]
@@ -526,7 +608,7 @@ def _latest(wheels):
 
 @dataclass(frozen=True)
 class CraftAt:
-    """A craft on one date: what an estimator asks for."""
+    """A craft on one date, as ``Craft.at`` returns it."""
 
     craft: Craft
     tai_ns: int | None
@@ -536,10 +618,27 @@ class CraftAt:
     doubts: Doubts = Doubts()
 
     def wheel(self, name: str) -> Wheel | None:
+        """The wheel of that name in service on the date; None where there is none."""
         return next((w for w in self.wheels if w.name == name), None)
 
     def effective_inertia(self, mechanism: str) -> np.ndarray:
-        """Inertia of the craft without a moving part, by the parallel-axis theorem (000 eqs 4, 5)."""
+        """Inertia of the craft without a moving part, by the parallel-axis theorem (cover paper eqs 4, 5).
+
+        Parameters
+        ----------
+        mechanism : str
+            Name of the part.
+
+        Returns
+        -------
+        ndarray, shape (3, 3)
+            [kg m2], body axes, about the craft's centre of mass.
+
+        Raises
+        ------
+        BadInput
+            For an unknown mechanism, and where no rigid body has the remaining inertia.
+        """
         I_B = self.inertia_kgm2 - self.craft.mechanism(mechanism).inertia_about_craft()
         check_inertia(I_B, f"{self.craft.name} without its {mechanism}")
         return I_B

@@ -27,13 +27,13 @@ def gravity_gradient(I_B: np.ndarray, position_B: np.ndarray, mu: float = MU_EAR
 
 
 def gravity_gradient_bound(I_B: np.ndarray, distance_m, mu: float = MU_EARTH) -> np.ndarray:
-    """3/2 mu (I_max - I_min) / r^3, the largest there is at any attitude. [N m]   004 eq 19
+    """3/2 mu (I_max - I_min) / r^3, the largest there is at any attitude. [N m]   plume paper eq 19
 
-    I_max, I_min: principal moments; 004 takes the tensor's diagonal, 0.7 % less for Cassini."""
+    I_max, I_min: principal moments; the plume paper takes the tensor's diagonal, 0.7 % less for Cassini."""
     moments = np.linalg.eigvalsh(I_B)
     return 1.5 * mu * (moments[-1] - moments[0]) / np.asarray(distance_m, float) ** 3
 
 
 def magnetic_torque_bound(dipole_Am2: float, field_T: float, field_change: float = 0.0) -> float:
-    """m B (1 + change), the largest at any attitude. [N m]   004 eq 20, whose "moment arm" is the dipole moment"""
+    """m B (1 + change), the largest at any attitude. [N m]   plume paper eq 20, whose "moment arm" is the dipole moment"""
     return dipole_Am2 * field_T * (1 + field_change)

@@ -1,9 +1,9 @@
-"""A flyby on a straight line at constant speed, and the flybys, jets and peaks that were published (004 Tables 1 to 4).
+"""A flyby on a straight line at constant speed, and the flybys, jets and peaks published in the plume paper (Tables 1 to 4).
 
-Beside Enceladus stands Titan with an exponential atmosphere, whose figures are assumed.
+Titan is there too, with an exponential atmosphere whose figures are assumed.
 
 Time counts from closest approach.  Gravity bends the path by 2 mu / (v^2 r): 2.3e-4 rad for E3, 1e-3 for the slow E9; over
-the minute in which a plume acts the place is off by some 100 m.  Past Titan it is 0.14 rad, and the path a hyperbola.
+the minute in which a plume acts the position is off by some 100 m.  Past Titan it is 0.14 rad, and the path a hyperbola.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from importlib import resources
 
 import numpy as np
 
+from ..kit.doubts import Doubts
 from ..kit.errors import BadInput, some_of
 from ..kit.quantities import quantity
 from .atmosphere import Exponential
@@ -37,7 +38,7 @@ class Moon:
 
     @property
     def small_torques_Nm(self) -> float:
-        """Bound of what sunlight, power generators and the magnetic field do to Cassini there. [N m]   004 section V, eq 20"""
+        """Bound of what sunlight, power generators and the magnetic field do to Cassini there. [N m]   plume paper section V, eq 20"""
         row = tables()["small_torques"]
         magnetic = magnetic_torque_bound(quantity(row["dipole"], "A m2"), self.field_T, self.field_change)
         return quantity(row["sunlight"], "N m") + quantity(row["power_generators"], "N m") + magnetic
@@ -45,9 +46,24 @@ class Moon:
 
 @dataclass(frozen=True)
 class Flyby:
-    """Where and how fast a craft passes a moon.  South latitude and west longitude of closest approach may be unknown.
+    """A straight path past a moon at constant speed.  Time counts from closest approach, in seconds.
 
-    ``noticed_s``: when the control loop first and last noticed the plume (004's points P and R)."""
+    Parameters
+    ----------
+    name : str
+        'E3' is the third flyby of Enceladus.
+    moon : Moon
+        The body passed.
+    altitude_m, speed_m_s : float
+        Above the moon's sphere [m], and relative to it [m/s], at closest approach.
+    latitude_south_rad, longitude_west_rad : float, optional
+        Of closest approach [rad]; None where they are not known.
+    date : str
+        Day of closest approach, as in '2008-03-12'; '' where it is not known.
+    noticed_s : (float, float), optional
+        When the control loop first and last noticed the plume (points P and R of the plume paper) [s].
+    source : str
+        Where these numbers were published."""
 
     name: str
     moon: Moon
@@ -60,9 +76,13 @@ class Flyby:
     source: str = ""
 
     @property
-    def doubts(self) -> tuple[str, ...]:
-        """What is not as it should be about the path: of a straight line from the tables nothing."""
-        return ()
+    def doubts(self) -> Doubts:
+        """Doubts about the path; a straight line from the tables has none."""
+        return Doubts()
+
+    def record(self) -> dict:
+        """What identifies the flyby, for a result's options."""
+        return {"name": self.name, "body": self.moon.name, "altitude_m": self.altitude_m, "speed_m_s": self.speed_m_s}
 
     @property
     def closest_m(self) -> float:
@@ -79,7 +99,7 @@ class Flyby:
         return np.hypot(*self.path(time_s))
 
     def altitude(self, time_s) -> np.ndarray:
-        """Above the moon's sphere. [m]   004 section V: 322.3 km at +34 s of E3"""
+        """Above the moon's sphere. [m]   plume paper section V: 322.3 km at +34 s of E3"""
         return self.distance(time_s) - self.moon.radius_m
 
     def climb_rate(self, time_s) -> np.ndarray:
@@ -91,7 +111,7 @@ class Flyby:
         return np.full(np.shape(time_s), self.speed_m_s)
 
     def from_source(self, jet, time_s) -> tuple[np.ndarray, np.ndarray]:
-        """Position from a jet's source (N, 3) [m] and the jet's axis (3,): the axes of ``in_plane``, and across that plane.   004 eq 23
+        """Position from a jet's source (N, 3) [m] and the jet's axis (3,), in the axes of ``in_plane`` and across that plane.   plume paper eq 23
 
         The axis is taken to lie in the plane, as in the paper."""
         along = np.array([np.sin(jet.tilt_rad), np.cos(jet.tilt_rad), 0.0])
@@ -101,13 +121,13 @@ class Flyby:
 
     def in_plane(self, time_s) -> np.ndarray:
         """From the moon's centre, in the plane of trajectory and spin axis: away from the axis on the side of closest
-        approach, and towards the south pole. (N, 2) [m]   004 eq 23
+        approach, and towards the south pole. (N, 2) [m]   plume paper eq 23
 
         Raises BadInput for a flyby whose latitude is not known."""
         if self.latitude_south_rad is None:
             raise BadInput(
                 f"the latitude of {self.name}'s closest approach is not known, and a jet's distance needs it",
-                remedy="Use a flyby of Table 1 (E3, E4, E9).",
+                remedy="Use a flyby of the plume paper's Table 1 (E3, E4, E9).",
             )
         out, along = self.path(time_s)
         south = self.latitude_south_rad
@@ -115,16 +135,32 @@ class Flyby:
             [out * np.cos(south) - along * np.sin(south), out * np.sin(south) + along * np.cos(south)], axis=-1
         )
 
-    def position(self, time_s, up_B, velocity_B) -> np.ndarray:
-        """Of the craft from the moon's centre in the axes of a body that does not turn. (N, 3) [m]
+    def from_south(self, time_s) -> np.ndarray:
+        """Seen along the spin axis from the south: towards 0 and towards 90 degrees west. (..., 2) [m]
 
-        up_B: from the moon's centre to the craft at closest approach; velocity_B: of the craft's motion; directions in
-        body axes.  Raises BadInput where the two are not perpendicular to 1 degree, as they are at closest approach."""
+        Raises BadInput for a flyby whose latitude or longitude is not known."""
+        west = self.known_longitude_rad()
+        return self.in_plane(time_s)[..., :1] * np.array([np.cos(west), np.sin(west)])
+
+    def known_longitude_rad(self) -> float:
+        """West longitude of closest approach. [rad]  Raises BadInput where it is not known."""
+        if self.longitude_west_rad is None:
+            raise BadInput(
+                f"the longitude of {self.name}'s closest approach is not known, and a jet's offset needs it",
+                remedy="Use a flyby of the plume paper's Table 1 (E3, E4, E9).",
+            )
+        return self.longitude_west_rad
+
+    def position(self, time_s, up_B, velocity_B) -> np.ndarray:
+        """Of the craft from the moon's centre, in body axes; the body does not turn. (N, 3) [m]
+
+        ``up_B``: direction from the moon's centre to the craft at closest approach; ``velocity_B``: direction of the craft's
+        motion there, both in body axes.  Raises BadInput where they are not perpendicular to 1 degree."""
         up, velocity = (np.asarray(v, float) / max(float(np.linalg.norm(v)), 1e-300) for v in (up_B, velocity_B))
         if min(np.linalg.norm(up), np.linalg.norm(velocity)) < 0.5 or abs(up @ velocity) > np.sin(np.radians(1)):
             raise BadInput(
-                "at closest approach the velocity is perpendicular to the vertical, and these two directions are not",
-                remedy="Give both in body axes: from the moon's centre to the craft at closest approach, and where it flies.",
+                "the velocity and the vertical at closest approach must be perpendicular, and the directions given are not",
+                remedy="Give both in body axes: the vertical from the moon's centre to the craft, and the direction of flight.",
             )
         out, along = self.path(time_s)
         return out[..., None] * up + along[..., None] * velocity
@@ -140,7 +176,7 @@ class Hyperbola(Flyby):
         excess = self.speed_m_s**2 - 2 * self.moon.mu_m3_s2 / self.closest_m
         if excess <= 0:
             raise BadInput(
-                f"at {self.speed_m_s:g} m/s a craft does not pass {self.moon.name} but stays with it",
+                f"a craft at {self.speed_m_s:g} m/s does not pass {self.moon.name}: it stays with it",
                 remedy=f"Give a speed above {np.sqrt(2 * self.moon.mu_m3_s2 / self.closest_m):.0f} m/s.",
             )
         return self.moon.mu_m3_s2 / excess
@@ -165,7 +201,7 @@ class Hyperbola(Flyby):
 
 @dataclass(frozen=True)
 class PublishedPeak:
-    """A row of 004 Table 4: by whom, when and how dense; ``density_kgm3`` from and to."""
+    """A row of the plume paper's Table 4: by which instrument, when and how dense; ``density_kgm3`` is (low, high)."""
 
     instrument: str
     flyby: str
@@ -173,6 +209,15 @@ class PublishedPeak:
     altitude_m: float
     density_kgm3: tuple[float, float]
     sigma_kgm3: float | None
+
+    @property
+    def middle_kgm3(self) -> float:
+        return float(np.mean(self.density_kgm3))
+
+    @property
+    def half_width_kgm3(self) -> float:
+        """Its published sigma, else half of its range."""
+        return self.sigma_kgm3 or 0.5 * (self.density_kgm3[1] - self.density_kgm3[0])
 
 
 @cache
@@ -213,12 +258,12 @@ def flyby_called(name: str) -> Flyby:
     for f in flybys():
         if f.name.upper() == short:
             return f
-    raise BadInput(f"{name!r} is no flyby of the tables", remedy=f"Name one of: {some_of(f.name for f in flybys())}.")
+    raise BadInput(f"flyby {name!r} is not known", remedy=f"Choose one of: {some_of(f.name for f in flybys())}.")
 
 
 @cache
 def published_peaks() -> tuple[PublishedPeak, ...]:
-    """004 Table 4."""
+    """Table 4 of the plume paper."""
     peaks = []
     for row in tables()["peak"]:
         density = [quantity(v, "kg/m3") for v in row["density"]]

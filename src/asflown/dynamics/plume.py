@@ -1,4 +1,4 @@
-"""Density of a plume that jets from a moon's surface (004 section VII, eqs 23 to 28).
+"""Density of a plume that jets from a moon's surface (plume paper section VII, eqs 23 to 28).
 
 A jet stands radially on the surface.  ``tilt`` (delta) is its colatitude, positive on the side of closest approach;
 ``offset`` (Delta) its distance from the plane of trajectory and spin axis.  SI with radians.
@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kit.errors import BadInput, some_of
+from ..kit.errors import check_choice
 from ..kit.quantities import quantity
 from .flyby import Flyby, tables
 
@@ -28,13 +28,27 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 VARIANTS, ANGLES = ("corrected", "printed"), ("plane", "space")
-#: Distances within which 004 applies eq 26. [m]
+#: Distances within which the plume paper applies eq 26. [m]
 NEAREST_M, FARTHEST_M = 50e3, 1400e3
 
 
 @dataclass(frozen=True)
 class Jet:
-    """One source: K [kg/m3] and K_theta [rad] of eq 26, and where it stands."""
+    """One source of a plume and the jet that leaves it radially (plume paper eq 26).
+
+    Parameters
+    ----------
+    name : str
+        As in 'Cairo'.
+    density_kgm3 : float
+        K, the density at one radius from the source on the jet's axis [kg/m3].
+    width_rad : float
+        K_theta, the angle from the axis at which exp(-(theta / K_theta)^n) has fallen to 1/e [rad].
+    tilt_rad, offset_m : float
+        As a flyby passes it: colatitude, positive on the side of closest approach [rad]; distance from the plane of
+        trajectory and spin axis [m].
+    latitude_south_rad, longitude_west_rad : float
+        Where it stands on the moon [rad]; NaN where only tilt and offset are known."""
 
     name: str
     density_kgm3: float
@@ -47,7 +61,7 @@ class Jet:
 
 @cache
 def published_jets() -> tuple[Jet, ...]:
-    """Alexandria, Cairo and Damascus as E3 passed them (004 Tables 2 and 3)."""
+    """Alexandria, Cairo and Damascus as E3 passed them (plume paper Tables 2 and 3)."""
     return tuple(
         Jet(
             row["name"], quantity(row["density"], "kg/m3"), quantity(row["width"], "rad"), quantity(row["tilt"], "rad"),
@@ -58,18 +72,19 @@ def published_jets() -> tuple[Jet, ...]:
 
 
 def offset(flyby: Flyby, latitude_south_rad: float, longitude_west_rad: float, variant: str = "corrected") -> float:
-    """Delta = R_E cos(latitude) |longitude - longitude of the trajectory|, distance from the flyby's plane. [m]   004 Table 2
+    """Delta = R_E cos(latitude) |longitude - longitude of the trajectory|, distance from the flyby's plane. [m]   plume paper Table 2
 
     The plane meets the moon in two meridians: the nearer one counts.  ``printed`` takes that of closest approach always."""
-    apart = abs(longitude_west_rad - _longitude(flyby))
-    if _check(variant, VARIANTS, "variant") == "corrected":
+    check_choice(variant, VARIANTS, "variant")
+    apart = abs(longitude_west_rad - flyby.known_longitude_rad())
+    if variant == "corrected":
         apart = abs((apart + np.pi / 2) % np.pi - np.pi / 2)
     return float(flyby.moon.radius_m * np.cos(latitude_south_rad) * apart)
 
 
 def tilt(flyby: Flyby, latitude_south_rad: float, longitude_west_rad: float) -> float:
-    """delta = colatitude, positive on the side of closest approach. [rad]   004 Table 2"""
-    side = np.sign(np.cos(longitude_west_rad - _longitude(flyby))) or 1.0
+    """delta = colatitude, positive on the side of closest approach. [rad]   plume paper Table 2"""
+    side = np.sign(np.cos(longitude_west_rad - flyby.known_longitude_rad())) or 1.0
     return float(side * (np.pi / 2 - latitude_south_rad))
 
 
@@ -85,14 +100,15 @@ def sources_passed(flyby: Flyby, given: Sequence[Jet] | None = None) -> list[Jet
 
 
 def seen_from(jet: Jet, flyby: Flyby, time_s, *, variant: str = "corrected", angle: str = "plane"):
-    """Distance r [m] of the craft from a jet's source and angle theta [rad] from its axis.   004 eq 23
+    """Distance r [m] of the craft from a jet's source and angle theta [rad] from its axis.   plume paper eq 23
 
     ``angle``: of the projection into the flyby's plane, as in the paper, or in ``space``, the offset counted: it has no cusp
     where the craft crosses the axis."""
-    _check(variant, VARIANTS, "variant")
+    check_choice(variant, VARIANTS, "variant")
+    check_choice(angle, ANGLES, "angle")
     apart, axis = flyby.from_source(jet, time_s)
     p, q, r = apart[..., 0], apart[..., 1], np.linalg.norm(apart, axis=-1)
-    if _check(angle, ANGLES, "angle") == "space":
+    if angle == "space":
         return r, np.arccos(np.clip(apart @ axis / np.maximum(r, 1e-9), -1, 1))
     if variant == "printed":
         with np.errstate(divide="ignore"):
@@ -104,7 +120,7 @@ def seen_from(jet: Jet, flyby: Flyby, time_s, *, variant: str = "corrected", ang
 def jet_density(
     jet: Jet, flyby: Flyby, time_s, *, power: float = 1, falloff: float = 1.5, variant: str = "corrected", angle: str = "plane"
 ) -> np.ndarray:  # fmt: skip
-    """rho = K (R_E / r)^falloff exp(-(theta / K_theta)^power), of one jet. [kg/m3]   004 eq 26
+    """rho = K (R_E / r)^falloff exp(-(theta / K_theta)^power), of one jet. [kg/m3]   plume paper eq 26
 
     The power in print can be read as 1 (default) or, as in eq 24, 2.  Within 50 km the distance counts as 50 km, where the
     paper's formula is not to be used and ``printed`` gives nothing; so it does beyond 1400 km."""
@@ -116,12 +132,12 @@ def jet_density(
 
 
 def plume_density(jets: Sequence[Jet], flyby: Flyby, time_s, **how) -> np.ndarray:
-    """Sum of all jets. [kg/m3]   004 eq 27.  ``how``: see ``jet_density``."""
+    """Sum of all jets. [kg/m3]   plume paper eq 27.  ``how``: see ``jet_density``."""
     return np.sum([jet_density(j, flyby, time_s, **how) for j in jets], axis=0)
 
 
 def plume_around_pole(n0, radius_m, distance_m, angle_rad, width_rad, depletion_m) -> np.ndarray:
-    """n = n0 (R_E/R)^2 exp(-(Theta/H_Theta)^2) exp(-(R - R_E)/H_d), in the unit of n0.   004 eq 24 (its reference 21)
+    """n = n0 (R_E/R)^2 exp(-(Theta/H_Theta)^2) exp(-(R - R_E)/H_d), in the unit of n0.   plume paper eq 24 (its reference 21)
 
     R from the moon's centre, Theta from the plume's."""
     R = np.asarray(distance_m, float)
@@ -134,32 +150,18 @@ def plume_around_pole(n0, radius_m, distance_m, angle_rad, width_rad, depletion_
 
 
 def density_by_altitude(altitude_m, constant=3.911e-8, start_m=20e3, epsilon=0.1) -> np.ndarray:
-    """rho = C (h + h0)^(-2 + epsilon) of one jet, C in kg/m3 at 1 km: kg/m3 km^1.9. [kg/m3]   004 eq 25 (its reference 27)
+    """rho = C (h + h0)^(-2 + epsilon) of one jet, C in kg/m3 at 1 km: kg/m3 km^1.9. [kg/m3]   plume paper eq 25 (its reference 27)
 
     With the constants in print one jet has a tenth of E3's peak at its altitude: they are ten, or C is ten times larger."""
     return constant * ((np.asarray(altitude_m, float) + start_m) / 1e3) ** (-2 + epsilon)
 
 
 def model_error(time_s, model_kgm3, reconstructed_kgm3, variant: str = "corrected") -> float:
-    """Root of the mean square over time of model less reconstructed. [kg/m3]   004 eq 28
+    """Root of the mean square over time of model less reconstructed. [kg/m3]   plume paper eq 28
 
     ``printed``: without the root [kg2/m6]; the 0.435e-12 kg/m3 in print is of the root."""
+    check_choice(variant, VARIANTS, "variant")
     t = np.asarray(time_s, float)
     off = np.asarray(model_kgm3, float) - np.asarray(reconstructed_kgm3, float)
     square = float(np.trapezoid(off**2, t) / (t[-1] - t[0]))
-    return square if _check(variant, VARIANTS, "variant") == "printed" else float(np.sqrt(square))
-
-
-def _longitude(flyby: Flyby) -> float:
-    if flyby.longitude_west_rad is None:
-        raise BadInput(
-            f"the longitude of {flyby.name}'s closest approach is not known, and a jet's offset needs it",
-            remedy="Use a flyby of Table 1 (E3, E4, E9).",
-        )
-    return flyby.longitude_west_rad
-
-
-def _check(value: str, allowed, what: str) -> str:
-    if value not in allowed:
-        raise BadInput(f"{what} {value!r} is not known", remedy=f"Choose one of: {some_of(allowed)}.")
-    return value
+    return square if variant == "printed" else float(np.sqrt(square))

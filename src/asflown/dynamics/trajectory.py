@@ -13,19 +13,35 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import minimize_scalar
 
+from ..kit.doubts import Doubts, Kind, Severity
 from ..kit.errors import BadInput
 from .flyby import Flyby
 from .plume import FARTHEST_M
 
-#: A trajectory is nearest at the closest approach named, but for so much. [s]
+#: A trajectory is nearest at the closest approach given, to within this. [s]  Assumed.
 _NEAR_S = 1.0
-#: A trajectory should hold what is below this altitude; gravity hardly bends what is above. [m]
+#: A trajectory should hold what is below this altitude; gravity hardly bends the path above. [m]  Assumed.
 _HELD_M = 1000e3
+
+NEAREST_ELSEWHEN = Kind(
+    "dynamics.nearest-elsewhen", Severity.SUSPECT,
+    "the trajectory is nearest {apart_s:.1f} s {when} the closest approach given",
+    "Check --closest-approach, and the trajectory's epoch.",
+)  # fmt: skip
+STRAIGHT_BEYOND = Kind(
+    "dynamics.straight-beyond", Severity.CAUTION,
+    "the trajectory covers {start_s:+.0f} to {stop_s:+.0f} s only: the path is assumed straight beyond, where gas is still possible",
+    "Give a trajectory that covers all that lies below 1000 km.",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class Trajectory(Flyby):
-    """Rows (N,) [s from closest approach], (N, 3) [m], (N, 3) [m/s]; altitude, speed and place are those of closest approach."""
+    """A flyby along rows of position and velocity; make one with ``Trajectory.along``.
+
+    ``time_s`` (N,): from closest approach [s]; ``position_m`` (N, 3) [m] and ``velocity_m_s`` (N, 3) [m/s]: from the body's
+    centre, in axes fixed to the body (z to its north pole, x through its prime meridian).  Altitude, speed, latitude and
+    longitude are those of closest approach."""
 
     time_s: np.ndarray = field(default_factory=lambda: np.empty(0))
     position_m: np.ndarray = field(default_factory=lambda: np.empty(0))
@@ -33,16 +49,16 @@ class Trajectory(Flyby):
 
     @classmethod
     def along(cls, flyby: Flyby, time_s, position_m, velocity_m_s) -> Trajectory:
-        """``flyby``: whose name, body and date it is.
+        """The flyby ``flyby`` (its name, body and date) along a trajectory, as the class describes its rows.
 
-        Raises BadInput where it does not come near the body, or goes through it."""
+        Raises BadInput where the trajectory does not hold closest approach, stays far from the body, or goes through it."""
         t, r, v = (np.asarray(x, float) for x in (time_s, position_m, velocity_m_s))
         common = {f.name: getattr(flyby, f.name) for f in fields(Flyby)}
         path = cls(**common | {"time_s": t, "position_m": r, "velocity_m_s": v})
         if not t[0] <= 0 <= t[-1]:
             raise BadInput(
-                f"the trajectory runs from {t[0]:.0f} to {t[-1]:.0f} s of closest approach and does not hold it",
-                remedy="Give one that does, and check --closest-approach.",
+                f"the trajectory covers {t[0]:.0f} to {t[-1]:.0f} s from closest approach and does not hold it",
+                remedy="Give a trajectory that does, and check --closest-approach.",
             )
         least = float(path.distance(path.closest_s))
         if least < flyby.moon.radius_m:
@@ -73,17 +89,15 @@ class Trajectory(Flyby):
         return float(minimize_scalar(self.distance, bounds=(low, high), method="bounded", options={"xatol": 1e-3}).x)
 
     @property
-    def doubts(self) -> tuple[str, ...]:
+    def doubts(self) -> Doubts:
+        """Doubts about the path: its closest approach is another, or it ends within reach of gas."""
         late, found = self.closest_s, []
         if abs(late) >= _NEAR_S:
-            when = "after" if late > 0 else "before"
-            found.append(f"the trajectory is nearest {abs(late):.1f} s {when} the closest approach named")
+            found.append(NEAREST_ELSEWHEN(apart_s=abs(late), when="after" if late > 0 else "before"))
         ends = self.time_s[[0, -1]]
         if (self.altitude(ends) < _HELD_M).any():
-            found.append(
-                f"the trajectory runs from {ends[0]:+.0f} to {ends[1]:+.0f} s only: beyond, though still within reach of gas, the path counts as straight"
-            )
-        return tuple(found)
+            found.append(STRAIGHT_BEYOND(start_s=float(ends[0]), stop_s=float(ends[1])))
+        return Doubts(found)
 
     @cached_property
     def _spline(self) -> CubicHermiteSpline:
@@ -114,6 +128,9 @@ class Trajectory(Flyby):
         south, west = jet.latitude_south_rad, jet.longitude_west_rad
         up = np.array([np.cos(south) * np.cos(west), -np.cos(south) * np.sin(west), -np.sin(south)])
         return self._turned(self.place(time_s) - self.moon.radius_m * up), self._turned(up)
+
+    def from_south(self, time_s) -> np.ndarray:
+        return self.place(time_s)[..., :2] * np.array([1, -1])
 
     def position(self, time_s, up_B, velocity_B) -> np.ndarray:
         super().position(0.0, up_B, velocity_B)  # refuses what is no pair of directions

@@ -1,1 +1,1 @@
-"""What every room stands on: errors, units at the border, time, rotations, local regression."""
+"""Shared by all rooms: errors, units, time, rotations, regression, smoothing, doubts, the base of results."""

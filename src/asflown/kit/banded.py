@@ -1,4 +1,4 @@
-"""Covariances with a band of correlation: each step shares its noise with its neighbours."""
+"""Covariances of steps that are correlated with their neighbours only."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 
 @dataclass(frozen=True)
 class Covariance:
-    """Block tridiagonal, factored once."""
+    """Block tridiagonal covariance, factored once; K steps of d components."""
 
     factor: np.ndarray
     variance: np.ndarray  # (K d,)
 
     @classmethod
     def of(cls, main, off) -> Covariance:
-        """main (K, d, d), off (K - 1, d, d): blocks beside the diagonal, symmetric."""
+        """From the blocks on the diagonal, main (K, d, d), and below it, off (K - 1, d, d); all symmetric."""
         K, d, _ = main.shape
         full = np.zeros((2 * d, K * d))  # lower form: full[i - j, j] = C[i, j]
         for r in range(d):

@@ -1,4 +1,4 @@
-"""The one door to numba: kernels compile where it is there and run as plain Python where it is not.
+"""The only use of numba: kernels are compiled where it is installed and run as plain Python where it is not.
 
 Kernels that call each other stand in one module: numba's cache does not notice a callee that changed
 in another file.

@@ -1,4 +1,4 @@
-"""TOML into validated data, with complaints a person can act on."""
+"""TOML into validated data, with messages a user can act on."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def toml_table(source: bytes, file: object) -> dict:
-    """The content of a TOML file.  Raises BadInput, naming the place, where it is not one."""
+    """The content of a TOML file.  Raises BadInput, naming the place, where it is not TOML."""
     try:
         return tomllib.loads(source.decode("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as why:
@@ -51,9 +51,9 @@ def _in_words(why: ValidationError) -> str:
 
 
 def changes_of(settings, option: str) -> dict:
-    """('a.b=2', 'c=10 s') -> {'a': {'b': 2}, 'c': '10 s'}: values as in TOML, and what is none of its values is text.
+    """('a.b=2', 'c=10 s') -> {'a': {'b': 2}, 'c': '10 s'}: values as in TOML; anything that is not a TOML value is text.
 
-    Raises BadInput for what is no key and value, and for a key set twice."""
+    Raises BadInput for text that is not a key and a value, and for a key set twice."""
     changes: dict = {}
     for text in settings:
         key, equals, value = text.partition("=")

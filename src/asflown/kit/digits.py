@@ -1,4 +1,4 @@
-"""Numbers as a person reads them: to the digits that the sigma allows, in a unit scaled to their size."""
+"""Numbers as text: to the digits that the sigma supports, in a unit scaled to their size."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 #: Prefixes by power of a thousand.
 _PREFIXES = {-4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M"}
-#: Units that take a prefix, and which of their powers are usual.
+#: Units that take a prefix, and the usual powers.
 _SCALED = {
     "N m": range(-4, 2), "N m s": range(-4, 2), "N": range(-4, 2), "N s": range(-4, 2), "s": range(-4, 1),
     "m": range(-4, 2), "m/s": range(-4, 2), "m/s2": range(-4, 1), "rad": range(-4, 1), "rad/s": range(-4, 1),
@@ -47,7 +47,7 @@ def plus_minus(value: float, sigma: float | None, unit: str = "") -> str:
 
 
 def interval(low: float | None, high: float | None, digits: int = 3) -> str:
-    """'-1.2 to 3.4'; an open end is said: 'below 3.4', 'above -1.2', 'unlimited'."""
+    """'-1.2 to 3.4'; with open ends 'below 3.4', 'above -1.2', 'unlimited'."""
     if low is None and high is None:
         return "unlimited"
     if low is None:

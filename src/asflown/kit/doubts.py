@@ -1,6 +1,6 @@
 """Doubts: what a user should know before trusting a result.
 
-A ``Kind`` is declared once, beside the code that finds it.  Calling it with what was found makes a ``Doubt``, whose text is
+A ``Kind`` is declared once, next to the code that finds it.  Calling it with what was found makes a ``Doubt``, whose text is
 the sentence a person reads.  Code asks for kinds and severities, never for words:
 
     UNEXPLAINED = Kind("fused.unexplained", Severity.SUSPECT,
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Severity(IntEnum):
-    """How much a doubt takes away from a result."""
+    """How much a doubt weakens a result."""
 
     NOTE = 1  # a choice was made for the user
     CAUTION = 2  # a known error is not in the sigma
@@ -48,7 +48,7 @@ class Kind:
     """One kind of doubt.
 
     ``id``: unique, 'room.what'; ``says``: the sentence, with named values in braces as ``str.format`` takes them;
-    ``remedy``: what the user can do, '' where there is nothing.  Raises ValueError for an id that is taken."""
+    ``remedy``: what the user can do, '' where there is none.  Raises ValueError for an id that is taken."""
 
     id: str
     severity: Severity
@@ -69,7 +69,7 @@ class Kind:
     def __call__(self, **told: Any) -> Doubt:
         """A doubt of this kind; numbers by their unit-bearing names, all else as text, lists joined.
 
-        Raises TypeError where the sentence names a value that is not told."""
+        Raises TypeError where the sentence names a value that is not given."""
         missing = self.names - set(told)
         if missing:
             raise TypeError(f"doubt {self.id!r} needs {', '.join(sorted(missing))}")
@@ -98,7 +98,9 @@ class Doubt:
     origin: str = ""
 
     def __str__(self) -> str:
-        return self.kind.says.format(**self.about, **self.numbers)
+        record = self.about.get("record", "")
+        sentence = self.kind.says.format(**self.about, **self.numbers)
+        return sentence if not record or "record" in self.kind.names else f"{record}: {sentence}"
 
     def __eq__(self, other) -> bool:
         return isinstance(other, Doubt) and (self.kind.id, str(self)) == (other.kind.id, str(other))
@@ -116,12 +118,16 @@ class Doubt:
 
     @property
     def is_grave(self) -> bool:
-        """Suspect or void: to be marked wherever the result is shown."""
+        """Suspect or void: marked wherever the result is shown."""
         return self.severity >= Severity.SUSPECT
 
     def passed_on_by(self, origin: str) -> Doubt:
         """The same doubt in another result; the first origin stays."""
         return self if self.origin else replace(self, origin=origin)
+
+    def of_record(self, record: str) -> Doubt:
+        """The same doubt of one of several records, whose name its sentence then begins with."""
+        return replace(self, about={"record": record, **self.about})
 
     def record(self) -> dict:
         """The JSON form, an element of ``doubts_detail``."""
@@ -136,14 +142,14 @@ class Doubt:
         }
 
 
-class Doubts(tuple[Doubt, ...]):
+class Doubts(tuple["Doubt", ...]):
     """Doubts of one result, in the order found, without repeats.
 
-    Takes doubts, other ``Doubts`` and None (which is nothing); a plain sentence becomes a doubt of unknown kind."""
+    Takes doubts, other ``Doubts`` and None (ignored); a plain sentence becomes a doubt of unknown kind."""
 
     def __new__(cls, found: Iterable[Doubt | str | None] = ()) -> Doubts:
         whole = (UNTOLD(sentence=d) if isinstance(d, str) else d for d in found if d is not None)
-        return super().__new__(cls, dict.fromkeys(whole))
+        return super().__new__(cls, dict.fromkeys(whole))  # type: ignore[arg-type]
 
     def __getnewargs__(self):
         return (tuple(self),)
@@ -183,7 +189,8 @@ class Doubts(tuple[Doubt, ...]):
     @property
     def gravest_first(self) -> Doubts:
         """Void, suspect, caution, note; within a severity as found."""
-        return Doubts(sorted(self, key=lambda d: -d.severity))
+        ordered: list[Doubt] = sorted(self, key=lambda d: -d.severity)
+        return Doubts(ordered)
 
     def sentences(self) -> list[str]:
         return [str(d) for d in self]
@@ -192,13 +199,19 @@ class Doubts(tuple[Doubt, ...]):
         """Two keys of every JSON: the sentences, and the same with kind, severity, numbers and remedy."""
         return {"doubts": self.sentences(), "doubts_detail": [d.record() for d in self]}
 
-    def grouped(self) -> Iterator[tuple[Doubt, int]]:
-        """Doubts that differ in their numbers only as one, the first, with their number; as found."""
-        groups: dict[tuple, list[Doubt]] = {}
-        for d in self:
-            groups.setdefault((d.kind.id, tuple(sorted(d.about.items()))), []).append(d)
-        for same in groups.values():
-            yield same[0], len(same)
+
+#: Parts that differ between events in otherwise equal doubts.
+_OF_ONE_EVENT = frozenset({"date", "time", "first", "last", "start", "stop", "spans"})
+
+
+def grouped(doubts: Iterable[Doubt]) -> Iterator[tuple[Doubt, int]]:
+    """Doubts of many results: those that differ only in numbers and dates as one, the first, with how many there are."""
+    groups: dict[tuple, list[Doubt]] = {}
+    for d in doubts:
+        same = tuple(sorted((n, v) for n, v in d.about.items() if n not in _OF_ONE_EVENT))
+        groups.setdefault((d.kind.id, same), []).append(d)
+    for those in groups.values():
+        yield those[0], len(those)
 
 
 def doubt_mark(doubt: Doubt) -> str:
@@ -212,7 +225,7 @@ def kinds() -> dict[str, Kind]:
 
 
 def doubt_from(record: dict) -> Doubt:
-    """A doubt from its JSON form; of an id that is not known any more it keeps severity and sentence."""
+    """A doubt from its JSON form; one whose id is no longer known keeps severity and sentence."""
     kind = _KINDS.get(record["kind"])
     if kind is not None and kind.names <= set(record["numbers"]) | set(record["about"]):
         return Doubt(kind, record["numbers"], record["about"], record.get("origin", ""))

@@ -1,8 +1,8 @@
 """Many records through one filter: columns of measurements that share a model share its gains.
 
 The covariances of a linear Gaussian model do not depend on what was measured.  They are run once; a
-further column costs only its means, with the innermost loop over columns.  This is what makes a design
-matrix of responses, or hundreds of paths, cheap.
+further column costs only its means, with the innermost loop over columns.  A design matrix of responses,
+or hundreds of paths, is therefore cheap.
 """
 
 from __future__ import annotations
@@ -249,7 +249,7 @@ _ONE_SIGMA = 0.6827
 
 
 def spread(samples: np.ndarray) -> np.ndarray:
-    """One sigma of samples (K, ...) with tails: the mean of what their middle 68 % and 95 % each say of it.
+    """One sigma of samples (K, ...) with tails: the mean of the estimates from their middle 68 % and 95 %.
 
     A posterior of corners is narrow with long tails: its standard deviation is that of the tails, its
     68 % interval that of the middle.  Normal samples give their standard deviation."""

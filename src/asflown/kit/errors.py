@@ -10,7 +10,7 @@ class BadInput(ValueError):
     and ``line`` say where, in the message and as attributes for code.
     """
 
-    LONGEST = 1400  # characters; a message nobody scrolls
+    LONGEST = 1400  # characters, so that a message needs no scrolling
 
     def __init__(
         self,
@@ -39,18 +39,25 @@ class BadInput(ValueError):
             head = head[: room - 1] + "…"
         super().__init__(f"{head}\n{remedy}")
 
+    def record(self) -> dict:
+        """The JSON form, ``error`` of a verb that was refused."""
+        return {
+            "what": self.what, "remedy": self.remedy, "file": self.file, "channel": self.channel, "time": self.time,
+            "line": self.line,
+        }  # fmt: skip
+
     def __reduce__(self):
         return _again, (self.what, self.remedy, self.file, self.channel, self.time, self.line)
 
     def within(self, file: object) -> BadInput:
-        """The same complaint, with the file it is about where none is named yet."""
+        """The same error, with the file where none is named yet."""
         if self.file is not None or not file:
             return self
         return BadInput(self.what, remedy=self.remedy, file=file, channel=self.channel, time=self.time, line=self.line)
 
 
 def check_choice(value, allowed, what: str) -> None:
-    """Raise BadInput where ``value`` is none of those allowed; None among them is not named."""
+    """Raise BadInput where ``value`` is not one of those allowed; the message does not list None."""
     if value not in allowed:
         raise BadInput(
             f"{what} {value!r} is not known", remedy=f"Choose one of: {some_of(a for a in allowed if a is not None)}."
@@ -58,7 +65,7 @@ def check_choice(value, allowed, what: str) -> None:
 
 
 def some_of(names, most: int = 12) -> str:
-    """A list of names for a message, never longer than a person reads."""
+    """A list of names for a message, cut to a readable length."""
     names = [str(n) for n in names]
     if len(names) <= most:
         return ", ".join(names) if names else "none"

@@ -1,4 +1,4 @@
-"""Files that are either whole or not there."""
+"""Files that are written completely or not at all."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def sha256_of(content: bytes) -> str:
 
 
 def check_place(path: str | Path) -> None:
-    """Raise BadInput where no file can be written: before the work whose result it is to hold.
+    """Raise BadInput where no file can be written; called before the work whose result it will hold.
 
-    What is there must be a plain file (a rename would replace a device or a pipe by one)."""
+    An existing file must be a plain one (a rename would replace a device or a pipe)."""
     path = Path(path)
     if os.path.exists(path) and not os.path.isfile(path):
         what = "a directory" if os.path.isdir(path) else "not a plain file"
@@ -30,7 +30,7 @@ def check_place(path: str | Path) -> None:
 
 
 def check_folder(folder: str | Path) -> None:
-    """Raise BadInput where no file can be put into ``folder``, nor it be made."""
+    """Raise BadInput where ``folder`` cannot be written to or made."""
     folder = Path(folder)
     there = next(p for p in (folder.absolute(), *folder.absolute().parents) if os.path.exists(p))
     try:

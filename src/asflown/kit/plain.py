@@ -13,7 +13,7 @@ def finite(number) -> float | None:
 
 
 def plain(value):
-    """Anything a result holds, as JSON has it: numbers finite or null, arrays as lists."""
+    """A value of a result in the types of JSON: numbers finite or null, arrays as lists."""
     if value is None or isinstance(value, (str, bool)):
         return value
     if isinstance(value, int):

@@ -1,4 +1,4 @@
-"""Units at the border: text with a unit becomes a plain SI number, once.
+"""Units: text with a unit becomes a plain SI number.
 
 Inside asflown every number is SI with radians; only this module knows other units.  Unit parsing
 and factors are astropy's, with ``rpm`` and dimensionless ``[]`` added.
@@ -53,14 +53,14 @@ def parse_unit(text: str):
 def si_factor(text: str, expected: str) -> float:
     """Factor from the unit ``text`` to SI, checked to be of the kind ``expected`` (an SI unit).
 
-    The radian counts as a unit of its own: rad/s is not accepted where Hz is meant.
+    The radian counts as a unit: rad/s is not accepted for Hz.
     """
     got, want = parse_unit(text), parse_unit(expected)
     try:
         factor = float(got.to(want))
     except Exception as why:
         raise BadInput(
-            f"the unit [{text}] does not measure what is needed here ([{expected}])",
+            f"the unit [{text}] does not convert to [{expected}]",
             remedy=f"Give a unit that converts to [{expected}].",
         ) from why
     if not 0 < factor < math.inf:  # as of [1e400 rad]
@@ -89,7 +89,7 @@ def numbers(text: object, expected: str, count: int) -> tuple[float, ...]:
     parts = re.split(r"[\s,]+", match.group(1).strip(" ,")) if match else []
     if match is None or len(parts) != count:
         raise BadInput(
-            f"{text!r} does not hold {count} numbers with one unit",
+            f"{text!r} is not {count} numbers with one unit",
             remedy=f'Write it as in "{" ".join("0" * count)} {expected}".',
         )
     unit = match.group(2).strip()
@@ -112,5 +112,5 @@ def plain_numbers(text: str, count: int, what: str) -> tuple[float, ...]:
     except ValueError:
         values = ()
     if len(values) != count or not all(abs(v) < _LARGEST for v in values):  # also NaN
-        raise BadInput(f"{what} {text!r} is not {count} numbers", remedy=f"Give {count} numbers divided by commas.")
+        raise BadInput(f"{what} {text!r} is not {count} numbers", remedy=f"Give {count} numbers separated by commas.")
     return values

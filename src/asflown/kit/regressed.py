@@ -6,7 +6,7 @@
 The filter is linear in what it is given, so it takes y and every column of Z through the same gains; generalized
 least squares on the innovations then gives beta with no prior on it, exactly.  The backward pass is that of the
 smoothed disturbances (de Jong 1989; modified Bryson-Frazier): its adjoint also gives the slope of the likelihood in
-every variance, for the price of one pass.
+every variance, at the cost of one pass.
 """
 
 from __future__ import annotations

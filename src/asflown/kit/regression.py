@@ -3,8 +3,8 @@
 At each instant a polynomial is fitted to the samples near it with tricube weights
 (1 - |u|^3)^3.  The window is either a half-width in the unit of t, or a number of nearest samples
 (classical loess).  Towards an end or across missing samples the window widens until it holds as many
-samples as in the interior, so an estimate exists up to the first and last sample, at a variance
-that says what it costs.
+samples as in the interior, so an estimate exists up to the first and last sample, with a
+correspondingly larger variance.
 
 Where samples lie on an even lattice, single ones perhaps missing, every complete window has one set
 of coefficients, computed once and applied as a correlation; ends, holes and uneven records are
@@ -19,6 +19,7 @@ import numpy as np
 
 from .compiled import jit
 from .errors import BadInput
+from .scatter import robust_sigma
 
 _MOST_PHASES = 64  # distinct offsets of the wanted instants within one sample step
 
@@ -105,7 +106,7 @@ def local_polynomial(
 
 @dataclass
 class _Fit:
-    """A LocalFit in the making; window -1 is not done yet."""
+    """A LocalFit under construction; window -1 is not done yet."""
 
     derivatives: np.ndarray
     window: np.ndarray
@@ -132,7 +133,8 @@ def loess(y, span: int, degree: int = 2) -> np.ndarray:
 def noise_sigma(t, y, *, degree: int, half_width: float) -> float:
     """Standard deviation of independent noise on samples, from the residuals of local fits.
 
-    Robust: a median, so that a few corners of the signal do not count as noise."""
+    Robust: a median, so that corners of the signal have little effect.  Unlike ``difference_sigma`` it takes uneven
+    samples, and signals that change from one to the next."""
     t, y = np.asarray(t, float), np.asarray(y, float)
     fit = local_polynomial(t, y, t, degree=degree, half_width=half_width)
     left = (1 - 2 * fit.owns + fit.gains[:, 0, 0])[fit.window]  # expected squared residual per unit noise variance
@@ -140,11 +142,12 @@ def noise_sigma(t, y, *, degree: int, half_width: float) -> float:
     if usable.sum() < 4:
         return float("nan")
     scaled = (y - fit.value)[usable] / np.sqrt(left[usable])
-    return float(1.4826 * np.median(np.abs(scaled)))
+    return float(robust_sigma(scaled))
 
 
 def memory(left) -> float:
-    """How many successive residuals are worth one that stands alone: 1 + 2 sum of autocorrelations, up to the first that noise would give."""
+    """Correlation length of residuals in samples, N over the effective sample size: 1 + 2 sum of autocorrelations, up to the first
+    that is within noise."""
     n, total, power = len(left), 1.0, float(left @ left)
     if n < 8 or power == 0:
         return 1.0
@@ -207,7 +210,7 @@ def _complete_windows(t, y, at, step, reach, degree, order, fit) -> None:
         k = np.arange(-n - 1, n + 3)
         k = k[np.abs(k - f) * step < reach * (1 - 1e-12)]
         offset = (k - f) * step
-        # a sample at the very edge weighs nothing, but would be counted as a neighbour: it must be there too
+        # a sample at the very edge has no weight but counts as a neighbour: it must exist too
         before, after = int(np.ceil(f - reach / step - 1e-9)), int(np.floor(f + reach / step + 1e-9))
         here, even = _complete(base, which, number, before, after, missing)
         if len(k) < degree + 1 or not len(here):
@@ -395,10 +398,10 @@ _OUTLYING = 4.0
 def robust_line(u, y) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """y = c0 + c1 u by repeated least squares without outliers: values (2,), covariance, which samples were used.
 
-    Samples in order of time: where their errors follow each other, the covariance is wider.  Where all u are one
-    the slope is taken as zero with a sigma that says it is not known, and the value at u stands."""
+    Samples in order of time: where their errors are correlated, the covariance is larger.  Where all u are equal
+    the slope is zero with a sigma that marks it as unknown, and the value holds at u."""
     u, y = np.asarray(u, float), np.asarray(y, float)
-    scatter = 1.4826 * float(np.median(np.abs(y - np.median(y))))
+    scatter = robust_sigma(y - np.median(y))
     used = np.abs(y - np.median(y)) <= 20 * scatter if scatter > 0 else np.ones(len(y), bool)
     for _ in range(20):
         centre, middle = float(u[used].mean()), float(y[used].mean())
@@ -406,7 +409,7 @@ def robust_line(u, y) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         narrow = spread <= 1e-12 * float(np.sum(u[used] ** 2))
         slope = 0.0 if narrow else float((u[used] - centre) @ y[used]) / spread
         left = y - middle - slope * (u - centre)
-        scatter = 1.4826 * float(np.median(np.abs(left[used])))
+        scatter = robust_sigma(left[used])
         again = np.abs(left) <= _OUTLYING * scatter
         if scatter == 0 or again.sum() < 4 or np.array_equal(again, used):
             break
@@ -416,9 +419,3 @@ def robust_line(u, y) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     of_slope = (100 * middle / centre) ** 2 if narrow else variance / spread
     J = np.array([[1.0, -centre], [0.0, 1.0]])
     return np.array([middle - slope * centre, slope]), J @ np.diag([variance / count, of_slope]) @ J.T, used
-
-
-def third_difference_sigma(values: np.ndarray) -> float:
-    """Noise of samples (N,) or (N, k) from third differences, in which the motion hardly shows; NaN where they are few."""
-    third = np.diff(values, 3, axis=0)
-    return 1.4826 * float(np.median(np.abs(third))) / np.sqrt(20) if len(third) else float("nan")

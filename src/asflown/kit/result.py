@@ -1,7 +1,7 @@
 """One face for every result: its record, table, files, frames and picture, with its doubts and provenance.
 
-``Estimate`` is the base; a result adds its numbers and says how they are laid out.  ``recorded`` goes on every public
-function that returns one: it notes inputs and options, and turns what the door found in the channels used into doubts.
+``Estimate`` is the base; a result adds its numbers and says how they are laid out.  ``recorded`` decorates every public
+function that returns one: it records inputs and options, and turns findings about the channels used into doubts.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .files import sha256_of, write_text, write_whole
 from .plain import plain
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from .table import Table
 
@@ -32,14 +32,14 @@ _VERSIONS = ("asflown", "numpy", "scipy", "numba", "astropy")
 
 
 class Input(NamedTuple):
-    """A file that a result rests on."""
+    """A file that a result was made from."""
 
     file: str
     sha256: str
 
 
 def inputs_of(*files) -> tuple[Input, ...]:
-    """Every file named, with its SHA-256; what is no file (a built-in name, None) is passed over."""
+    """Every file named, with its SHA-256; anything else (a built-in name, None) is skipped."""
     return tuple(
         Input(str(f), sha256_of(Path(f).read_bytes()))
         for f in files
@@ -68,7 +68,7 @@ def provenance(inputs=(), options: dict | None = None, seed=None) -> dict:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Estimate:
-    """What every result has beside its numbers.
+    """Base of all results: what they have in common.
 
     ``craft``, ``epoch``: whose, and the instant that times count from ('' where there is none); ``method``, ``variant``: how;
     ``settings``: what the estimator chose; ``inputs``, ``options``, ``seed``: what it was given (see ``provenance``)."""
@@ -91,21 +91,21 @@ class Estimate:
         if not isinstance(self.doubts, Doubts):
             object.__setattr__(self, "doubts", Doubts(self.doubts))
 
-    # ---- what a result says of itself ----
+    # ---- given by each result ----
 
     def _record(self) -> dict:
         """The result's own part of its JSON, in its order."""
         raise NotImplementedError
 
     def _tables(self) -> tuple[Table, ...]:
-        """What a person scans."""
+        """The tables shown to the user."""
         raise NotImplementedError
 
     def series(self) -> Series | None:
         """The result over time; None for one that is not a function of time."""
         return None
 
-    # ---- what follows from that ----
+    # ---- derived ----
 
     @property
     def provenance(self) -> dict:
@@ -118,7 +118,7 @@ class Estimate:
         return record | self.doubts.record()
 
     def table(self) -> str:
-        """The table a person scans, as text."""
+        """The tables as text."""
         return "\n".join(map(str, self._tables()))
 
     def with_doubts(self, *found) -> Any:
@@ -134,7 +134,7 @@ class Estimate:
         return f"<{type(self).__name__}: {', '.join(words)}{doubted}>"
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the tables, and the doubts with the gravest first."""
+        """HTML for a notebook: the tables, and the doubts with the gravest first."""
         doubts = "".join(
             f"<li><b>{d.severity.label}</b> {escape(str(d))} <i>{escape(d.remedy)}</i></li>"
             for d in self.doubts.gravest_first
@@ -171,7 +171,7 @@ class Estimate:
     def save(self, path) -> None:
         """Into a file, by its suffix: .json (all of it), .csv or .parquet (the series), provenance and doubts inside.
 
-        Raises BadInput for another suffix, for a place that cannot be written, and for a table of what has no series."""
+        Raises BadInput for another suffix, for a file that cannot be written, and for a table of a result without a series."""
         kind = Path(path).suffix.lower()
         if kind == ".json":
             whole = self.record() | {"provenance": self.provenance}
@@ -189,7 +189,7 @@ class Estimate:
 
     def plot(self, ax=None):
         """Draw the result into matplotlib axes, new ones unless given; returns them."""
-        # plots stand above results; this one is looked up by name, and only when it is asked for
+        # plots are above results: the function is imported by name, and only when needed
         return import_module("asflown.plots").draw(self, ax)
 
     # ---- helpers ----
@@ -207,7 +207,7 @@ class Estimate:
         }  # fmt: skip
 
     def _save_csv(self, path) -> None:
-        """Comment lines, a heading with units, and rows; blank where unknown.  Nothing half-written stays."""
+        """Comment lines, a heading with units, and rows; blank where unknown.  No partial file remains."""
         columns = _flat(self._needed_series())
         lines = [
             f"# epoch: {self.epoch}",
@@ -236,6 +236,10 @@ class Estimate:
         write_whole(path, write)
 
 
+#: Units whose names hold an underscore themselves.
+_UNITS_OF_TWO = ("rad_s2", "rad_s", "m_s2", "m_s")
+
+
 def _flat(series: Series) -> dict[str, Any]:
     """Columns of one number each; 'torque_Nm' of three becomes 'torque_x_Nm', …: the unit stays last."""
     import numpy as np
@@ -245,7 +249,8 @@ def _flat(series: Series) -> dict[str, Any]:
         if np.ndim(values) == 1:
             flat[name] = values
             continue
-        stem, _, unit = name.rpartition("_")
+        unit = next((u for u in _UNITS_OF_TWO if name.endswith(f"_{u}")), name.rpartition("_")[2])
+        stem = name.removesuffix(unit).removesuffix("_")
         for member, column in zip(series.members, np.asarray(values).T, strict=False):
             flat[f"{stem}_{member}_{unit}" if stem else f"{name}_{member}"] = column
     return flat
@@ -278,7 +283,7 @@ R = TypeVar("R")
 
 
 def recorded(estimate: Callable[P, R]) -> Callable[P, R]:
-    """Decorate a public function that returns an ``Estimate``: its inputs, options and the door's doubts go into the result.
+    """Decorate a public function that returns an ``Estimate``: its inputs, options and the doubts of the screening go into the result.
 
     Arguments that are inputs have ``inputs``; telemetry also has ``watched()``, a copy that notes which channels are used, and
     ``found_in(used)``, doubts about those.  All other arguments are options."""
@@ -288,36 +293,42 @@ def recorded(estimate: Callable[P, R]) -> Callable[P, R]:
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
         bound = signature.bind(*args, **kwargs)
         bound.apply_defaults()
-        watched = []
 
         def watch(value):
             if hasattr(value, "watched"):
                 value = value.watched()
-                watched.append(value)
             elif isinstance(value, (list, tuple)) and value and all(hasattr(v, "watched") for v in value):
                 value = type(value)(map(watch, value))
             return value
 
         for name, value in bound.arguments.items():
             bound.arguments[name] = watch(value)
-        result: Any = estimate(*bound.args, **bound.kwargs)
-        inputs: list[Input] = []
-        options = {}
-        for name, value in bound.arguments.items():
-            several = value if isinstance(value, (list, tuple)) else [value]
-            if several and all(hasattr(v, "inputs") for v in several):
-                inputs += [i for v in several for i in v.inputs]
-            elif not callable(value):
-                options[name] = _told(value)
-        found = Doubts(d for t in watched for d in t.found_in(t.used))
-        return replace(
-            result,
-            inputs=tuple(dict.fromkeys((*result.inputs, *inputs))),
-            options=result.options or options,
-            doubts=result.doubts + found,
-        )
+        return noted(estimate(*bound.args, **bound.kwargs), bound.arguments)
 
     return call
+
+
+def noted(result: Any, given: Mapping[str, Any]) -> Any:
+    """The result with what it was given: inputs, options, and the findings about the channels used.
+
+    ``given``: arguments by name, telemetry among them as its watched copy.  For a class; a function is ``recorded``."""
+    inputs: list[Input] = []
+    options, found = {}, Doubts()
+    for name, value in given.items():
+        several = value if isinstance(value, (list, tuple)) else [value]
+        if several and all(hasattr(v, "inputs") for v in several):
+            inputs += [i for v in several for i in v.inputs]
+            for v in several:
+                of_this = v.found_in(v.used or ()) if hasattr(v, "watched") else Doubts()
+                found += of_this if len(several) == 1 else [d.of_record(v.source) for d in of_this]
+        elif not callable(value):
+            options[name] = _told(value)
+    return replace(
+        result,
+        inputs=tuple(dict.fromkeys((*result.inputs, *inputs))),
+        options=result.options or options,
+        doubts=result.doubts + found,
+    )
 
 
 def _told(value):

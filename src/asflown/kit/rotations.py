@@ -22,7 +22,7 @@ def quaternion(r: Rotation) -> np.ndarray:
 def attitude_error(q_commanded, q_estimated) -> np.ndarray:
     """Commanded minus estimated, a small-angle vector in body axes. [rad], shape (..., 3)
 
-    q_c = q_e (x) [1, e/2]: turning the body by +e brings it to the command."""
+    q_c = q_e (x) [1, e/2]: rotating the body by +e brings it to the commanded attitude."""
     return (rotation(q_estimated).inv() * rotation(q_commanded)).as_rotvec()
 
 

@@ -1,14 +1,14 @@
 """JSON records as types, and the JSON Schema of a verb made from them.
 
-A result's record is described once, as a ``TypedDict`` beside the result; ``Annotated[..., Doc("…")]`` says what a key means.
+A result's record is described once, as a ``TypedDict`` beside the result; ``Annotated[..., Doc("…")]`` gives the meaning of a key.
 Unknown values are null, so numbers are ``Number``.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired
 
-from typing_extensions import Doc, NotRequired, TypedDict
+from typing_extensions import Doc, TypedDict
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -52,9 +52,9 @@ class ProvenanceRecord(TypedDict):
 
 
 def verb_record(record: type, old: Mapping[str, str] | None = None) -> dict[str, Any]:
-    """Keys of a verb's JSON object with their types: the record's own, and what every verb has.
+    """Keys of a verb's JSON object with their types: those of the record, and those of every verb.
 
-    ``old``: keys of earlier versions that still stand beside (see ``Estimate.OLD_KEYS``); those at the top only."""
+    ``old``: keys of earlier versions that are kept (see ``Estimate.OLD_KEYS``); those at the top only."""
     from typing import get_type_hints
 
     own = get_type_hints(record, include_extras=True)

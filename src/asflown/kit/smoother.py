@@ -3,7 +3,7 @@
 Every scalar measurement is taken in at its own step, so channels may have any cadence and any sample
 may be missing.  Process noise has a fixed part and driven parts whose size may differ from step to step.
 The backward pass is the modified Bryson-Frazier form: it inverts nothing, so a singular covariance (a
-state that is known, a deterministic part of the loop) does no harm.
+known state, a deterministic part of the loop) is allowed.
 
 Covariances and gains do not depend on what was measured, only on when.  Where the steps repeat with a
 period, both passes settle into repeating theirs; from there on gains are reused and a step costs
@@ -18,7 +18,7 @@ import numpy as np
 
 from .compiled import jit
 
-#: Longest period of the steps that is looked for.  1 s beside 64 s is within it.
+#: Longest period of the steps that is searched for.  1 s and 64 s together are within it.
 _LONGEST_PERIOD = 64
 #: Two covariances are the same when no element differs by more, in units of both its sigmas.
 _SAME = 1e-12
@@ -54,7 +54,7 @@ def discretize(F: np.ndarray, Qc: np.ndarray, steps_s) -> tuple[np.ndarray, np.n
     """Exact A and Q of dx = F x dt + white noise of spectral density Qc, for each step.
 
     Series over a short span, then doubling: A(2t) = A(t)^2, Q(2t) = Q(t) + A(t) Q(t) A(t)^T.  Many
-    times faster than a matrix exponential of twice the size, which would be most of a fit's time."""
+    times faster than a matrix exponential of twice the size, which would take most of the time of a fit."""
     F, Qc = np.ascontiguousarray(F, float), np.ascontiguousarray(Qc, float)
     return _discretize(F, Qc, np.ascontiguousarray(steps_s, float))
 
@@ -101,7 +101,7 @@ def log_likelihood(model: Model, data: Measurements) -> float:
 class Smoothed:
     """Mean (N, n) given all measurements; innovations over their sigma (M,).
 
-    ``alone``: (M,), what each measurement differs by from what all the others say of it, over its sigma.
+    ``alone``: (M,), difference of each measurement from its prediction by all others, over its sigma.
     Covariances that repeat are held once: that of step k is ``matrices[case[k]]``."""
 
     mean: np.ndarray
@@ -126,7 +126,7 @@ def smooth(model: Model, data: Measurements) -> Smoothed:
     ll, mean, covariances, innovation, variance, product, origin = _filter(*arrays, True)
     A, _, _, _, which, H, _, _, _, start, row, _, period, _ = arrays
     case, alone = _backward(A, which, H, start, row, period, mean, covariances, innovation, variance, product, origin)
-    # a variance that rounding drove below zero (values of absurd size) shows as NaN, without noise
+    # a variance that rounding made negative (extreme values) becomes NaN, without a warning
     whitened = innovation / np.sqrt(np.where(variance > 0, variance, np.nan))
     return Smoothed(mean, covariances, case, whitened, alone, float(ll))
 
@@ -302,7 +302,7 @@ def _take_in(P, h, noise, Ph):
 def _backward(A, which, H, start, row, period, mean, covariances, innovation, variance, product, origin):
     """Smooth the filtered means in place; lay smoothed covariances beside or over the filtered ones.
 
-    Returns where that of each step lies, and each measurement against all the others (de Jong's u / sqrt D).  A step that repeats another's has its own place free, and no step
+    Returns where that of each step lies, and each measurement compared with all the others (de Jong's u / sqrt D).  A step that repeats another's has its own place free, and no step
     reads the place of a later one that did not."""
     steps, n = mean.shape
     case, phases = np.empty(steps, np.int64), max(period, 1)

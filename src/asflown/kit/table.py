@@ -1,4 +1,4 @@
-"""A result's table, once: as text for a terminal, as HTML for a notebook."""
+"""A table of a result: as text for a terminal, as HTML for a notebook."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from html import escape
 
 @dataclass(frozen=True)
 class Table:
-    """Title, column heads, rows of text, and remarks beneath.  Numbers come as text, already to the digits they deserve.
+    """Title, column heads, rows of text, and remarks beneath.  Numbers are given as text, already rounded.
 
-    ``head`` may be empty: rows then need no names.  The first column is set left, the others right."""
+    ``head`` may be empty: rows then need no names.  The first column is left-aligned, the others right-aligned."""
 
     title: str
     rows: tuple[tuple[str, ...], ...] = ()

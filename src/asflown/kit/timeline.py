@@ -1,4 +1,4 @@
-"""Time: an axis of int64 nanoseconds TAI, and the labels people write.
+"""Time: an axis of int64 nanoseconds TAI, and UTC labels.
 
 Scales and leap seconds are astropy's (its bundled table, never a download).  UTC exists only at
 the edge; inside, a day with a leap second has 86,401 seconds and intervals come out right.
@@ -24,10 +24,10 @@ _MOST_DAYS = 92_000  # either way: 1748 to 2251; int64 nanoseconds end in 2292
 
 @cache
 def _astropy_time():
-    """astropy.time without network and without complaints about dates beyond its tables.
+    """astropy.time without network access and without warnings about dates beyond its tables.
 
     A date past the last announced leap second is converted with the last known offset, as every
-    ground system does; nothing better exists until the next one is announced.
+    ground system does, until the next one is announced.
     """
     from astropy.utils import iers
 
@@ -46,7 +46,7 @@ def _to_ns(time) -> np.ndarray:
     tai = time.tai
     day, rest = np.asarray(tai.jd1, float), np.asarray(tai.jd2, float)
     if np.any(np.abs(day - _JD_ORIGIN) > _MOST_DAYS):
-        raise ValueError("int64 nanoseconds do not reach that far")
+        raise ValueError("the time is outside the range of int64 nanoseconds")
     return np.rint((day - _JD_ORIGIN) * _DAY_NS).astype(np.int64) + np.rint(rest * _DAY_NS).astype(np.int64)
 
 
@@ -120,7 +120,7 @@ def utc_label(tai_ns: int, digits: int = 0) -> str:
 
 
 def seconds_since(tai_ns, epoch_ns: int) -> np.ndarray:
-    """Elapsed SI seconds, from integers so that nothing is lost far from the epoch."""
+    """Elapsed SI seconds, from integers, so that no precision is lost far from the epoch."""
     return (np.asarray(tai_ns, np.int64) - np.int64(epoch_ns)) / NS
 
 

@@ -1,4 +1,4 @@
-"""What was done to the expected dV of a maneuver, kept in a ledger so that nothing is done twice (002 Appendix C)."""
+"""What was done to the expected dV of a maneuver, kept in a ledger so that nothing is done twice (Wagner 2014 Appendix C)."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def entered(ledger: Ledger, adjustment: Adjustment, maneuver: str) -> Ledger:
 def scale_corrected(expected_dv, burn_dv, ratio) -> np.ndarray:
     """Expected dV as the craft would have flown it with the right scale factor or thrust. [m/s], (N, 3)
 
-    expected + (c - 1) burn: 002 eq 6 with c = estimated / onboard accelerometer scale factor for an engine cut off by
+    expected + (c - 1) burn: Wagner 2014 eq 6 with c = estimated / onboard accelerometer scale factor for an engine cut off by
     an accelerometer, eq 7 with c = predicted / onboard thrust for one cut off by time.  Turns and deadband firing are
     not measured by the accelerometer and stay as they are."""
     return np.asarray(expected_dv) + (np.asarray(ratio, float)[:, None] - 1) * np.asarray(burn_dv)

@@ -1,4 +1,4 @@
-"""The thrust-vector-control frame, in which an execution error has a magnitude and a pointing part (002 Appendix C)."""
+"""The thrust-vector-control frame, in which an execution error has a magnitude and a pointing part (Wagner 2014 Appendix C)."""
 
 from __future__ import annotations
 

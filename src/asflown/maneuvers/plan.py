@@ -11,6 +11,7 @@ import numpy as np
 from ..kit.config import read_bytes
 from ..kit.errors import BadInput, some_of
 from ..kit.files import sha256_of
+from ..kit.result import Input
 from .columns import Columns, read_table
 from .frame import SMALLEST, tvc_axes
 
@@ -22,8 +23,7 @@ class Plan:
     id: tuple[str, ...]
     dv_mps: np.ndarray  # (N,)
     axes: np.ndarray | None = None
-    source: str = ""
-    sha256: str = ""
+    inputs: tuple[Input, ...] = ()
 
 
 def load_plan(path) -> Plan:
@@ -53,4 +53,4 @@ def load_plan(path) -> Plan:
             raise columns.wrong(int(row), "dv", f"{dv[row]:g} m/s is not the size of a burn", "A dV is positive.")
     except BadInput as why:
         raise why.within(path) from None
-    return Plan(ids, dv, axes, str(path), sha256_of(data))
+    return Plan(ids, dv, axes, (Input(str(path), sha256_of(data)),))

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..kit.config import read_bytes
+from ..kit.doubts import Doubt, Doubts, Kind, Severity
 from ..kit.errors import BadInput, some_of
 from ..kit.files import sha256_of
+from ..kit.result import Input
 from .adjust import SCALE, Adjustment, Ledger, entered, scale_corrected
 from .columns import Columns, read_table
 from .frame import SMALLEST, resolved, tvc_axes
@@ -21,6 +23,26 @@ from .history import engine_called
 _ROUNDED = 2e-4
 #: A median error beyond this share of the dV is rather a wrong unit.
 _BEYOND_BELIEF = 0.3
+
+NO_MAGNITUDE_SIGMA = Kind(
+    "maneuvers.no-magnitude-sigma", Severity.CAUTION,
+    "sigma_magnitude is zero throughout: errors of the orbit determination count as execution errors",
+    "Give the orbit determination's sigmas.",
+)  # fmt: skip
+NO_POINTING_SIGMA = Kind(
+    "maneuvers.no-pointing-sigma", Severity.CAUTION,
+    "the pointing errors have no sigmas: errors of the orbit determination count as execution errors",
+    "Give sigma_pointing_x and sigma_pointing_y.",
+)  # fmt: skip
+NO_POINTING = Kind(
+    "maneuvers.no-pointing", Severity.NOTE, "the table has no pointing errors: pointing is not estimated",
+    "Give pointing_error_x and pointing_error_y.",
+)  # fmt: skip
+LARGE_ERRORS = Kind(
+    "maneuvers.large-errors", Severity.SUSPECT,
+    "the median magnitude error is {share_percent:.0f} % of the dV: is a unit in the headings wrong?",
+    "Check the units in the headings.",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -41,8 +63,8 @@ class Maneuvers:
     ledger: tuple[Ledger, ...] = ()
     excluded: tuple[tuple[str, str], ...] = ()  # (id, reason) of what was left out
     source: str = ""
-    sha256: str = ""
-    doubts: tuple[str, ...] = field(default=())
+    inputs: tuple[Input, ...] = ()
+    doubts: Doubts = Doubts()
 
     def __post_init__(self):
         if not self.ledger:
@@ -54,6 +76,15 @@ class Maneuvers:
     @property
     def engines(self) -> list[str]:
         return sorted(set(self.engine))
+
+    @property
+    def engine_name(self) -> str | None:
+        """Of maneuvers of one engine, as the table calls it; None where it does not."""
+        return self.engine[0] or None
+
+    @property
+    def engine_label(self) -> str:
+        return self.engine_name or "engine not named"
 
     @property
     def across(self) -> tuple[np.ndarray, np.ndarray]:
@@ -130,21 +161,35 @@ class Maneuvers:
         return replace(rest, excluded=(*self.excluded, *((self.id[k], reason) for k in sorted(gone))))
 
 
-def load_maneuvers(path) -> Maneuvers:
-    """Read a table of maneuvers: CSV (plain or gzip), Parquet, or TOML.
+def load_maneuvers(path: str | Path) -> Maneuvers:
+    """Read a table of executed maneuvers.
 
-    Either errors already resolved (dv, magnitude_error, sigma_magnitude; pointing_error_x and _y with their sigmas and
-    correlation) or vectors (reconstructed_dv, expected_dv or its parts, covariance, craft_x), with units in the
-    headings; docs/maneuvers.md lists the columns.  Expected dV are corrected for accelerometer scale or thrust where
-    there is a correction_ratio (002 eqs 6, 7), once.  Rows with a reason in ``excluded`` are left out, and listed.
-    Raises BadInput, naming file, line and column, for anything it cannot read."""
+    Expected dV are corrected for accelerometer scale or thrust where there is a correction_ratio (Wagner 2014 eqs 6, 7), once.
+
+    Parameters
+    ----------
+    path : str or Path
+        CSV (plain or gzip), Parquet or TOML; units in the headings; docs/maneuvers.md lists the columns.  It holds errors already
+        resolved (dv, magnitude_error, sigma_magnitude; pointing_error_x and _y with sigmas and correlation), or inertial
+        vectors (reconstructed_dv, expected_dv or its parts, covariance, craft_x).
+
+    Returns
+    -------
+    Maneuvers
+        SI, TVC frame, in order of time.  Rows with a reason in the column ``excluded`` are left out, and listed.
+
+    Raises
+    ------
+    BadInput
+        For anything that cannot be read, with file, line and column.
+    """
     path = Path(path)
     try:
         data = read_bytes(path, "maneuver table", "Give a CSV, Parquet or TOML file.")
         columns = Columns(read_table(path, data))
         columns.need("id")
         found = _vectors(columns) if columns.has("reconstructed_dv") else _scalars(columns)
-        found = replace(found, source=str(path), sha256=sha256_of(data))
+        found = replace(found, source=str(path), inputs=(Input(str(path), sha256_of(data)),))
         return _used(_in_order(found), columns)
     except BadInput as why:
         raise why.within(path) from None
@@ -181,39 +226,40 @@ def _scalars(columns: Columns) -> Maneuvers:
             f"errors already resolved stand beside {some_of([*others, *(['correction_ratio'] if 'correction_ratio' in columns else [])])}",
             remedy="Give either resolved errors or vectors with reconstructed_dv; a correction needs the vectors.",
         )
-    doubts = []
     dv, error, sigma = (columns.numbers(n) for n in ("dv", "magnitude_error", "sigma_magnitude"))
     _positive(columns, "dv", dv)
     _not_negative(columns, "sigma_magnitude", sigma)
-    if not sigma.any():
-        doubts.append(
-            "sigma_magnitude is zero throughout: what the orbit determination was wrong by is counted as execution error"
-        )
-    pointing = covariance = None
-    if "pointing_error_x" in columns or "pointing_error_y" in columns:
-        columns.need("pointing_error_x", "pointing_error_y")
-        pointing = np.stack([columns.numbers(f"pointing_error_{a}") for a in "xy"], axis=1)
-        covariance, said = _pointing_covariance(columns)
-        doubts += said
-    else:
-        stray = [n for n in ("sigma_pointing_x", "sigma_pointing_y", "correlation_xy") if n in columns]
-        if stray:
-            raise BadInput(
-                f"{some_of(stray)} without pointing errors", channel=stray[0], remedy="Give pointing_error_x and _y."
-            )
-        doubts.append("there are no pointing errors: nothing is said of pointing")
-    with_share = np.median(np.abs(error) / dv)
-    if with_share > _BEYOND_BELIEF:
-        doubts.append(
-            f"the median magnitude error is {100 * with_share:.0f} % of the dV: is a unit in the headings wrong?"
-        )
+    pointing, covariance, unsure = _pointing(columns)
+    share = float(np.median(np.abs(error) / dv))
+    doubts = [
+        None if sigma.any() else NO_MAGNITUDE_SIGMA(),
+        unsure,
+        LARGE_ERRORS(share_percent=100 * share) if share > _BEYOND_BELIEF else None,
+    ]
     return Maneuvers(
         _ids(columns), columns.words("engine"), dv, error, sigma, pointing, covariance, columns.times(), _books(columns),
-        doubts=tuple(doubts),
+        doubts=Doubts(doubts),
     )  # fmt: skip
 
 
-def _pointing_covariance(columns: Columns) -> tuple[np.ndarray, list[str]]:
+def _pointing(columns: Columns) -> tuple[np.ndarray | None, np.ndarray | None, Doubt | None]:
+    """Pointing errors (N, 2), their covariance (N, 2, 2), and what is to be doubted of them."""
+    if "pointing_error_x" in columns or "pointing_error_y" in columns:
+        columns.need("pointing_error_x", "pointing_error_y")
+        errors = np.stack([columns.numbers(f"pointing_error_{a}") for a in "xy"], axis=1)
+        covariance = _pointing_covariance(columns)
+        unsure = NO_POINTING_SIGMA() if covariance is None else None
+        return errors, np.zeros((len(columns), 2, 2)) if covariance is None else covariance, unsure
+    stray = [n for n in ("sigma_pointing_x", "sigma_pointing_y", "correlation_xy") if n in columns]
+    if stray:
+        raise BadInput(
+            f"{some_of(stray)} without pointing errors", channel=stray[0], remedy="Give pointing_error_x and _y."
+        )
+    return None, None, NO_POINTING()
+
+
+def _pointing_covariance(columns: Columns) -> np.ndarray | None:
+    """(N, 2, 2) [m2/s2]; None where the table gives no sigmas."""
     n = len(columns)
     given = [x for x in ("sigma_pointing_x", "sigma_pointing_y") if x in columns]
     if not given:
@@ -221,9 +267,7 @@ def _pointing_covariance(columns: Columns) -> tuple[np.ndarray, list[str]]:
             raise BadInput(
                 "a correlation without sigmas", channel="correlation_xy", remedy="Give sigma_pointing_x and _y."
             )
-        return np.zeros((n, 2, 2)), [
-            "there are no sigmas of the pointing errors: what the orbit determination was wrong by is counted as execution error"
-        ]
+        return None
     columns.need("sigma_pointing_x", "sigma_pointing_y")
     x, y = (columns.numbers(f"sigma_pointing_{a}") for a in "xy")
     for name, s in (("sigma_pointing_x", x), ("sigma_pointing_y", y)):
@@ -231,7 +275,7 @@ def _pointing_covariance(columns: Columns) -> tuple[np.ndarray, list[str]]:
     r = columns.numbers("correlation_xy", 0.0) if "correlation_xy" in columns else np.zeros(n)
     for row in np.flatnonzero(np.abs(r) > 1)[:1]:
         raise columns.wrong(int(row), "correlation_xy", f"{r[row]:g} is not a correlation", "It lies between -1 and 1.")
-    return np.stack([np.stack([x * x, r * x * y], -1), np.stack([r * x * y, y * y], -1)], axis=1), []
+    return np.stack([np.stack([x * x, r * x * y], -1), np.stack([r * x * y, y * y], -1)], axis=1)
 
 
 def _vectors(columns: Columns) -> Maneuvers:
@@ -281,7 +325,7 @@ def _vectors(columns: Columns) -> Maneuvers:
 
 
 def _expected(columns: Columns, parts: dict[str, np.ndarray]) -> np.ndarray:
-    """Expected dV = burn + turns + deadband firing, given whole or in parts (002 Appendix C)."""
+    """Expected dV = burn + turns + deadband firing, given whole or in parts (Wagner 2014 Appendix C)."""
     if not columns.has("expected_dv"):
         if "burn_dv" not in parts:
             columns.need("expected_dv_x")

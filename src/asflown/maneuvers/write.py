@@ -18,7 +18,18 @@ if TYPE_CHECKING:
 
 
 def write_maneuvers(m: Maneuvers, path: str | Path) -> None:
-    """Write resolved errors as CSV, nothing half written.  Raises BadInput where the place cannot be written."""
+    """Write resolved errors as a CSV table that ``load_maneuvers`` reads; nothing half written stays.
+
+    Parameters
+    ----------
+    m : Maneuvers
+    path : str or Path
+
+    Raises
+    ------
+    BadInput
+        Where the place cannot be written.
+    """
     write_text(path, maneuver_text(m))
 
 

@@ -14,15 +14,15 @@ if TYPE_CHECKING:
 #: Result -> (module, function that draws its main panel into axes, function that saves the whole figure).
 _DRAWN = {
     "ExternalTorqueResult": ("external_torque", "draw_external_torque", "save_external_torque_figure"),
-    "TorqueResult": ("torque", "draw_result", "save_torque_figure"),
+    "TorqueResult": ("torque", "draw_torque", "save_torque_figure"),
     "DensityResult": ("density", "draw_density", "save_density_figure"),
-    "JetsResult": ("density", "draw_jets", "save_jets_figure"),
+    "JetsResult": ("jets", "draw_jets", "save_jets_figure"),
     "InertiaResult": ("inertia", "draw_inertia", "save_inertia_figure"),
     "WheelsResult": ("wheels", "draw_wheels", "save_wheels_figure"),
     "ThrustResult": ("thrust", "draw_thrust", "save_thrust_figure"),
     "LeakResult": ("leak", "draw_leak", "save_leak_figure"),
-    "GatesResult": ("maneuvers", "draw_gates", "save_gates_figure"),
-    "GatesWatchResult": ("maneuvers", "draw_watch", "save_watch_figure"),
+    "GatesResult": ("gates", "draw_gates", "save_gates_figure"),
+    "GatesWatchResult": ("gates_watch", "draw_watch", "save_watch_figure"),
 }
 
 

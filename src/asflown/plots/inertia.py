@@ -1,4 +1,4 @@
-"""Slews: body rates as in 001's Figures B1-B3, what the wheels held, and the momentum left over."""
+"""Slews: body rates as in Feldman and Lee's Figures B1-B3, what the wheels held, and the residual momentum."""
 
 from __future__ import annotations
 
@@ -11,6 +11,13 @@ from .figure import BY_AXIS, GREY, breaks, new_figure, save, write_doubts
 
 if TYPE_CHECKING:
     from ..estimate.inertia import InertiaResult
+
+
+def draw_inertia(result: InertiaResult, ax):
+    """Body rates with the slews.  Returns ax."""
+    draw_rates(result, ax)
+    ax.set_xlabel(f"time from {result.epoch} [s]")
+    return ax
 
 
 def draw_rates(result: InertiaResult, ax):
@@ -33,14 +40,14 @@ def draw_momentum(result: InertiaResult, ax):
 
 
 def draw_residual(result: InertiaResult, ax):
-    """Momentum that the fit leaves over: noise around zero where it explains the data.  Returns ax."""
+    """Residual momentum of the fit: noise around zero where it explains the data.  Returns ax."""
     e = result.evidence
-    scale, unit = (1.0, "rad/s") if result.relative else (1e3, "mN m s") if result.residual_rms < 1 else (1.0, "N m s")
+    scale, unit = result.residual_unit
     for k, colour in enumerate(BY_AXIS):
         ax.plot(e.time_s[e.used], scale * e.residual_Nms[e.used, k], ".", ms=2, color=colour, label=AXES[k])
     ax.axhline(0, color=GREY, linewidth=0.8)
-    ax.set_ylabel(f"left over\n[{unit}]")
-    ax.set_title(f"rms {scale * result.residual_rms:.3g} {unit}", loc="right", fontsize=8, color=GREY)
+    ax.set_ylabel("residual / spin inertia\n[rad/s]" if result.relative else f"residual momentum\n[{unit}]")
+    ax.set_title(f"rms {scale * result.residual_rms_Nms:.3g} {unit}", loc="right", fontsize=8, color=GREY)
     return ax
 
 
@@ -53,7 +60,7 @@ def _lines(result: InertiaResult, values: np.ndarray, ax) -> None:
 
 
 def save_inertia_figure(result: InertiaResult, path) -> None:
-    """Rates, wheels, what is left over; doubts beneath."""
+    """Rates, wheels, residual; doubts beneath."""
     figure, (rates, wheels, left) = new_figure(3, 1, width=9.0, height=2.4)
     draw_rates(result, rates)
     draw_momentum(result, wheels)

@@ -1,1 +1,1 @@
-"""One page for the anomaly board: verdict first, then what it rests on."""
+"""One page for the anomaly board: verdict first, then its evidence."""

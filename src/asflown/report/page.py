@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..kit.doubts import Doubts
 from ..kit.files import write_text
 from ..kit.plain import plain
 from ..plots import trend as draw
@@ -22,12 +23,12 @@ if TYPE_CHECKING:
 
     from ..trends.verdicts import FigureHealth, Health
 
-#: Figures whose years are drawn first, whatever is found (000 Figs 17, 18).
+#: Figures whose history is always drawn first (cover paper Figs 17, 18).
 _FIRST = ("angular_impulse", "peak_positive", "peak_negative")
 
 
 def write_report(healths: list[Health], out: Path, provenance: dict) -> tuple[Path, dict]:
-    """The page at ``out`` and its JSON twin beside it; returns the twin's path and what it holds.
+    """Write the page to ``out`` and the same as JSON next to it; returns the path and the content of the JSON.
 
     ``healths``: a verdict for each kind, the one that decides first.  Raises BadInput where the places cannot be written."""
     from .. import __version__
@@ -36,7 +37,7 @@ def write_report(healths: list[Health], out: Path, provenance: dict) -> tuple[Pa
     record = {
         "command": "report", "verdict": healths[0].verdict, "reasons": list(healths[0].reasons),
         "kinds": [health_record(h) for h in healths],
-        "doubts": list(dict.fromkeys(d for h in healths for d in h.doubts)), "provenance": provenance,
+        **Doubts(d for h in healths for d in h.doubts).record(), "provenance": provenance,
     }  # fmt: skip
     page = template("report.html", quantity=_quantity, number=_number, interval=_interval).render(
         healths=healths, main=healths[0], sections=[(h, _pictures(h)) for h in healths],
@@ -48,7 +49,7 @@ def write_report(healths: list[Health], out: Path, provenance: dict) -> tuple[Pa
 
 
 def _pictures(h: Health) -> list[Picture]:
-    """Pictures of one kind of actuation, in the order a board asks for them."""
+    """Pictures of one kind of actuation, in the order of the page."""
     entries, newest = list(h.entries), h.entries[-1]
     one = f"the {h.kind} of {newest.date[:10]}"
     pictures: list[Picture] = []
@@ -66,7 +67,7 @@ def _pictures(h: Health) -> list[Picture]:
     if h.kind not in MOVES:
         return pictures
     if len(entries) > 3:
-        add("family", "The newest in front of its family", f"{one}, fused, and where 95 of 100 further ones would run "
+        add("family", "The newest compared with its family", f"{one}, fused, and the 95 % prediction band of a further one "
             "at each instant.", draw.family_figure(newest, entries[:-1], "newest against the past"))  # fmt: skip
     for basis in BASES:
         if any(e.curve(f"torque, {basis}") is not None for e in entries):
@@ -74,16 +75,16 @@ def _pictures(h: Health) -> list[Picture]:
                 draw.overlay_figure(entries, f"torque, {basis}", basis))  # fmt: skip
     for basis in BASES:
         if newest.curve(f"torque, {basis}") is not None:
-            add(f"merit-{basis[:5]}", f"Figures of merit, {basis}", f"{one}: shaded the impulse of the first phase, dashed the mean "
+            add(f"merit-{basis[:5]}", f"Figures of merit, {basis}", f"{one}: the shaded area is the impulse of the first phase, the dashed lines are the means "
                 "of the two largest excursions of each sign after it.", draw.merit_figure(newest, basis, basis))  # fmt: skip
     if h.pairs:
         for basis in BASES:
-            add(f"cold-{basis[:5]}", f"Cold and warm, {basis}", "Crosses: after a long rest; rings: the next one. A colour a pair.",
+            add(f"cold-{basis[:5]}", f"Cold and warm, {basis}", "Crosses: after a long rest; rings: the next one. Each pair has its colour.",
                 draw.cold_warm_figure(h.pairs, f"torque, {basis}", basis))  # fmt: skip
     if newest.curve("motor_current") is not None:
         add("devices", "Devices", f"{one}: the motor stalls in the green span, between two samples.",
-            draw.devices_figure(newest, "thermal and devices data beside the torque"))  # fmt: skip
-    add("methods", "Methods compared", f"{one}: all channels at once with its 95 % band, and the papers' two methods.",
+            draw.devices_figure(newest, "torque with thermal and device data"))  # fmt: skip
+    add("methods", "Methods compared", f"{one}: the fused method with its 95 % band, and the two methods of the cover paper.",
         draw.methods_figure(newest, "three bases"))  # fmt: skip
     return pictures
 
@@ -97,7 +98,7 @@ def _trend_words(f: FigureHealth) -> str:
         low, high = t.change_percent_ci95
         said = f"Change over the years {t.change_percent:+.0f} % (95 %: {low:+.0f} to {high:+.0f} %), {said}"
     if t.detectable_percent is not None:
-        said += f"; a change of {t.detectable_percent:.0f} % would have been seen in 8 of 10 such histories"
+        said += f"; a change of {t.detectable_percent:.0f} % would be detected with 80 % power"
     sudden = sudden_words(f)
     return said + "." + ("" if sudden is None else f" {sudden[0].upper()}{sudden[1:]}.")
 
@@ -107,12 +108,12 @@ def _number(value, digits: int = 3) -> str:
 
 
 def _interval(ends) -> str:
-    """'+13 to +40 %'; nothing where an end is not known."""
+    """'+13 to +40 %'; '' where an end is not known."""
     return "" if ends is None or not np.isfinite(ends).all() else f"{ends[0]:+.0f} to {ends[1]:+.0f} %"
 
 
 def _quantity(value, sigma, unit: str) -> str:
-    """'-0.282 ± 0.004 N m s', in the unit people read."""
+    """'-0.282 ± 0.004 N m s', in a unit suited to its size."""
     if value is None:
         return "not known"
     scale, shown = draw.DRAWN_IN.get(unit, (1.0, unit))

@@ -39,7 +39,7 @@ class BurnSet:
     tracking: Tracking
 
 
-#: As many burns as the 2012-1 models were made of, over the sizes they are valid for (002 Table 1).
+#: As many burns as the 2012-1 models were made of, over the sizes they are valid for (Wagner 2014, Table 1).
 MAIN_ENGINE_SET = BurnSet("main-engine", 48, 0.3, 13.0, Tracking(0.5e-3, 1e-4))
 RCS_SET = BurnSet("rcs", 49, 0.01, 0.3, Tracking(0.1e-3, 2e-3))
 
@@ -79,7 +79,7 @@ def execute(gates: Gates, burns: BurnSet, seed, *, dv_mps=None, weaker=None, ids
     )  # fmt: skip
 
 
-#: Burns of the A branch's last months, sizes assumed but for the last (002 Figure 12): the third is too small to show anything.
+#: Burns of the A branch's last months, sizes assumed but for the last (Wagner 2014, Figure 12): the third is too small to show anything.
 A_BRANCH_END = {"OTM-160": 0.12, "OTM-166": 0.015, "OTM-169": 0.23}
 #: RCS burns before them.
 A_BRANCH_BEFORE = 37

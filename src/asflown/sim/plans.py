@@ -39,6 +39,10 @@ class Plan(Part):
         """The TOML's content, changes included: what to keep in order to fly it again."""
         return self._written
 
+    def record(self) -> dict:
+        """The JSON form, among the options of what was made of it."""
+        return self._written
+
     @classmethod
     def load(cls, name_or_path: str | Path) -> Self:
         """A shipped one by name, or one from a TOML file.

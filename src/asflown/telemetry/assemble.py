@@ -1,4 +1,4 @@
-"""Columns of tables become channels: the ground on which self-describing files and dictionaries stand."""
+"""Columns of tables become channels; used for self-describing files and for channel dictionaries."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class Read:
-    """What a way of reading found in the tables, before screening."""
+    """Channels read from the tables, before screening."""
 
     channels: dict[str, Channel]
     epoch_ns: int
@@ -34,7 +34,7 @@ class Read:
 
 @dataclass(frozen=True)
 class Use:
-    """One column put to use: channel value = (cell x scale + offset) [unit]."""
+    """How one column becomes a channel: value = (cell x scale + offset) [unit]."""
 
     column: int
     name: str
@@ -63,12 +63,10 @@ def channel_from(table: Table, use: Use, tai_ns: np.ndarray, findings: list[Find
             values = values * factor + shift
         if len(said_nan):
             findings.append(
-                Finding(use.name, "nan", len(said_nan), int(tai_ns[said_nan[0]]), "cells that say 'nan', taken as blank")
+                Finding(use.name, "nan", len(said_nan), int(tai_ns[said_nan[0]]), "cells contain 'nan' and count as blank")
             )  # fmt: skip
     if len(rows) == 0:
-        raise BadInput(
-            "the column holds no value at all", channel=use.name, remedy="Remove the column, or give the data."
-        )
+        raise BadInput("the column has no values", channel=use.name, remedy="Remove the column, or add its data.")
     return Channel(
         use.name, tai_ns[rows], values, np.ones(len(rows), bool), use.unit, use.count_size, modulus=use.modulus
     )
@@ -109,7 +107,7 @@ def assembled(parts: Sequence[tuple[Table, int, str, list[Use], list[int]]], epo
         for use in uses:
             if use.name in channels:
                 raise BadInput(
-                    "two columns hold this channel", channel=use.name, remedy="Keep one of them, or rename one."
+                    "two columns contain this channel", channel=use.name, remedy="Keep one of them, or rename one."
                 )
             channels[use.name] = channel_from(table, use, tai_ns, findings)
         if clocks and not labels:
@@ -117,11 +115,11 @@ def assembled(parts: Sequence[tuple[Table, int, str, list[Use], list[int]]], epo
             labels = {table.headings[j]: np.array([str(c) for c in table.columns[j]], dtype=str) for j in clocks}
     if len(rows := np.concatenate(times)) > 1 and (rows == rows[0]).all():
         raise BadInput(
-            f"time stands still: all {len(rows)} rows have the same time",
+            f"all {len(rows)} rows have the same time",
             remedy="Check that the first column is the time, and that it was written with enough digits.",
         )
     if not channels:
-        raise BadInput("the table holds no channel besides time", remedy="Add columns such as 'body_rate_x [rad/s]'.")
+        raise BadInput("the table has no channel other than time", remedy="Add columns such as 'body_rate_x [rad/s]'.")
     epoch_ns = origin if origin is not None else (whole_second(times[0][0]) if dated else 0)
     return Read(channels, epoch_ns, dated, labels, label_ns, findings, times)
 
@@ -138,4 +136,4 @@ def origin_of(epoch: str | None) -> int | None:
 _TIME_UNITS = ("utc", "gps s", "et s")
 
 
-_LARGEST = 1e60  # beyond it squares and units overflow, and nothing is measured so
+_LARGEST = 1e60  # larger values overflow when squared or converted; no measurement reaches them

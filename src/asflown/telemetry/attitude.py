@@ -1,8 +1,8 @@
-"""The attitude against the body rates: does the quaternion turn the way the gyros say?
+"""The attitude against the body rates: does the quaternion turn in the direction that the gyros measure?
 
 Rates are differenced from the quaternion under the declared convention and under its alternatives
-(conjugate, other order).  Only a significantly better alternative is refused; where the craft hardly
-moves nothing can be said, and that is said.
+(conjugate, other order).  The file is refused only where an alternative fits significantly better.  Where the
+craft hardly moves the direction cannot be tested; a doubt says so.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from ..kit.errors import BadInput
 from ..kit.rotations import rates_between
 from ..kit.timeline import NS
 from .channels import AXES
-from .findings import ERROR_TOO_FAST, RATE_SCALE
+from .findings import ERROR_TOO_FAST, NEVER_TOGETHER, RATE_SCALE, TURNS_TOO_LITTLE
 from .telemetry import BRIDGED, Telemetry
 
 if TYPE_CHECKING:
     from ..kit.doubts import Doubt
 
 SIGNIFICANT = 14.0  # log-likelihood: odds of a million to one
-BETTER = 1.5  # and by this ratio of squared misfit, which a small timing error does not reach
-COHERENT = 0.9  # part of the motion in common from which scales are compared
+BETTER = 1.5  # and by this ratio of squared misfit, more than a small timing error causes
+COHERENT = 0.9  # share of the motion in common needed to compare scales
 OFF_SCALE = 1.25
-TOO_FAST = 10.0  # times the body rate: no loop does this, a unit does (57 or 1000)
+TOO_FAST = 10.0  # times the body rate: no control loop does this, a wrong unit does (57 or 1000)
 
 _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
-#: What a rate's scale betrays.
+#: Wrong unit suggested by a rate's scale.
 MISTAKEN_UNITS = {180 / np.pi: "deg/s labelled rad/s", 1e3: "mrad/s labelled rad/s", 30 / np.pi: "rpm labelled rad/s",
                   np.pi / 180: "rad/s labelled deg/s", 1e-3: "rad/s labelled mrad/s", 1e6: "microrad/s labelled rad/s",
                   648_000 / np.pi: "arcsec/s labelled rad/s"}  # fmt: skip
@@ -58,9 +58,7 @@ def check_attitude(telemetry: Telemetry, readings: dict[str, tuple[np.ndarray, n
         remedy = "Correct [quaternion] in the channel dictionary."
     mid_ns, w = _measured(telemetry, tai_ns)
     if mid_ns is None:
-        return _doubted(
-            telemetry, "quaternion: direction not testable, body rates and attitudes are hardly ever known together"
-        )
+        return _doubted(telemetry, NEVER_TOGETHER())
     declared, rate = _residual(tai_ns, q, mid_ns, w)
     odds = {}
     for name, (at_ns, other) in readings.items():
@@ -77,10 +75,7 @@ def check_attitude(telemetry: Telemetry, readings: dict[str, tuple[np.ndarray, n
         )
     turned = next(iter(odds))  # the conjugate comes first
     if odds[turned][0] > -SIGNIFICANT:
-        telemetry = _doubted(
-            telemetry,
-            f"quaternion: direction not testable, the body turns too little (rates of rms {_rms(w):.2g} rad/s)",
-        )
+        telemetry = _doubted(telemetry, TURNS_TOO_LITTLE(rms_rad_s=_rms(w)))
     return _scales(telemetry, rate, w)
 
 
@@ -130,7 +125,7 @@ def _log_odds(residual: np.ndarray, declared: np.ndarray) -> float:
 
 
 def _error_scale(telemetry: Telemetry) -> Telemetry:
-    """Doubt the attitude error's unit where it changes many times faster than the body turns.
+    """Doubt the unit of the attitude error where it changes many times faster than the body turns.
 
     In a hold de/dt = -w.  Its slope against w is compared with a clear excess only: while the command
     moves the error follows the motion less, never more."""
@@ -154,9 +149,9 @@ def _error_scale(telemetry: Telemetry) -> Telemetry:
 
 
 def rate_scale(telemetry: Telemetry) -> tuple[float, str] | None:
-    """Body rates over those of the quaternion, and what that factor betrays ('' where it is near one).
+    """Ratio of the body rates to those of the quaternion, and the wrong unit it suggests ('' where it is near one).
 
-    None where both are not there, or do not move together."""
+    None where one of them is missing, or their motions do not correlate."""
     names = [f"quaternion_{m}" for m in "wxyz"]
     if not all(n in telemetry for n in names) or not telemetry.has_axes("body_rate"):
         return None
@@ -179,7 +174,7 @@ def _scale(rate: np.ndarray, w: np.ndarray) -> tuple[float, str] | None:
 
 
 def _scales(telemetry: Telemetry, rate: np.ndarray, w: np.ndarray) -> Telemetry:
-    """Doubt a unit where rates and attitude move together but not by the same amount."""
+    """Doubt a unit where rates and attitude are correlated but differ in scale."""
     found = _scale(rate, w)
     if found is None or not found[1]:
         return telemetry

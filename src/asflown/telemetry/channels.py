@@ -25,8 +25,8 @@ class ChannelKind:
     member: Literal["axis", "component", "wheel", "thruster", "mechanism", "none"]
     meaning: str
     behaves: Literal["sensor", "cumulative", "steps", "state"] = "sensor"
-    plausible: float | None = None  # largest believable magnitude, SI: beyond it the unit is doubted
-    mistaken_for: str = ""  # what a larger value most often is
+    plausible: float | None = None  # largest plausible magnitude, SI; beyond it the unit is doubted
+    mistaken_for: str = ""  # unit that a larger value most often has
 
 
 KINDS = (
@@ -37,7 +37,7 @@ KINDS = (
                 mistaken_for="mrad or deg"),
     ChannelKind("rate_error", "rad/s", "axis", "commanded minus estimated rate", plausible=0.05,
                 mistaken_for="mrad/s or deg/s"),
-    ChannelKind("controller_rate_error", "rad/s", "axis", "rate error with KP e added (000 eq 17)", plausible=0.05,
+    ChannelKind("controller_rate_error", "rad/s", "axis", "rate error with KP e added (cover paper eq 17)", plausible=0.05,
                 mistaken_for="mrad/s or deg/s"),
     ChannelKind("quaternion", "", "component", "attitude, body to inertial", plausible=1.001),
     ChannelKind("on_time", "s", "thruster", "cumulative commanded on-time", behaves="cumulative"),
@@ -118,7 +118,7 @@ def to_si(name: str, unit: str) -> tuple[float, float]:
         return 1.0, 273.15
     try:
         if unit != "":
-            parse_unit(unit)  # first: an unknown unit is a clearer complaint than a wrong one
+            parse_unit(unit)  # first: "unknown unit" is a clearer message than "wrong kind of unit"
         return si_factor(unit, kind.unit), 0.0
     except BadInput as why:
         raise BadInput(why.what, channel=name, remedy=why.remedy) from why

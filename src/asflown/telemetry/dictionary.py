@@ -1,6 +1,6 @@
-"""Channel dictionaries: any table's columns renamed, scaled and turned to house conventions, once.
+"""Channel dictionaries: columns of any table renamed, scaled and converted to the conventions used here.
 
-A dictionary is TOML; unknown keys are refused and columns it does not mention are left aside.
+A dictionary is TOML; unknown keys are refused, and columns it does not mention are ignored.
 
     [time]                       column, format ("s", "utc", "gps s", "et s", "unix s"), epoch (UTC, for "s"),
                                  labels = [further time columns, kept as written]
@@ -93,7 +93,7 @@ class LongEntry(_Part):
 
 
 class ChannelDictionary(_Part):
-    """What the columns of one kind of file are."""
+    """The meaning of the columns of one kind of file."""
 
     time: TimeColumn
     channel: tuple[ChannelEntry, ...] = ()
@@ -116,7 +116,7 @@ def load_dictionary(path) -> ChannelDictionary:
 
 
 def _check(entry: ChannelDictionary) -> None:
-    """What the shape alone cannot say: names, units, and nothing mapped twice."""
+    """Checks beyond the types: names, units, and nothing mapped twice."""
     columns = [c.column for c in entry.channel]
     names = [c.name for c in entry.channel]
     if entry.quaternion:
@@ -150,7 +150,9 @@ def _uses(entry: ChannelDictionary, at: dict[str, int]) -> list[Use]:
         if c.unit == "count" and si != "":
             if not size:
                 raise BadInput(
-                    "cells in counts need the size of one", channel=c.name, remedy='Add count = "0.4 rpm", with a unit.'
+                    "cells in counts need the size of one count",
+                    channel=c.name,
+                    remedy='Add count = "0.4 rpm", with a unit.',
                 )
             unit, scale, offset = si, scale * size, offset * size
         wrap = 0.0
@@ -161,7 +163,9 @@ def _uses(entry: ChannelDictionary, at: dict[str, int]) -> list[Use]:
             wrap = abs(scale) * to_si(c.name, unit)[0] * quantity(number, "") if counts else quantity(c.wrap, si)
             if not wrap > 0:
                 raise BadInput(
-                    "a modulus is positive", channel=c.name, remedy='Write wrap = "65536 count" or "360 deg".'
+                    "the modulus of a wrap must be positive",
+                    channel=c.name,
+                    remedy='Write wrap = "65536 count" or "360 deg".',
                 )
         uses.append(Use(at[c.column], c.name, unit, scale, offset, size, wrap))
     if entry.orbit:
@@ -247,11 +251,17 @@ def _add_quaternion(read: Read, parts, said: QuaternionEntry) -> None:
         if not known.all():
             first = int(tai_ns[~known][0])
             read.findings.append(
-                Finding("quaternion_w", "orbit", int((~known).sum()), first, "quaternions without the orbit, left out")
+                Finding(
+                    "quaternion_w",
+                    "orbit",
+                    int((~known).sum()),
+                    first,
+                    "quaternions at times without orbit data, left out",
+                )
             )
         if not known.any():
             raise BadInput(
-                "the orbit is nowhere known where the quaternion is", channel="quaternion", remedy="Check [orbit]."
+                "orbit and quaternion are never known at the same time", channel="quaternion", remedy="Check [orbit]."
             )
         tai_ns, q = tai_ns[known], q[known]
 
@@ -286,16 +296,14 @@ def _raw_quaternion(read: Read, parts, names: tuple[str, ...]) -> tuple[np.ndarr
     for t, _ in columns[1:]:
         common = np.intersect1d(common, t)
     if len(common) == 0:
-        raise BadInput(
-            "the four columns are never sampled together", channel="quaternion", remedy="Check [quaternion]."
-        )
+        raise BadInput("the four columns have no common sample", channel="quaternion", remedy="Check [quaternion].")
     # file order is kept, so that disorder and duplicates are seen by the screening
     kept = [(t[np.isin(t, common)], v[np.isin(t, common)]) for t, v in columns]
     if any(len(t) != len(kept[0][0]) or (t != kept[0][0]).any() for t, _ in kept):
         once = [np.unique(t, return_index=True) for t, _ in kept]
         return once[0][0], np.stack([v[i] for (_, i), (_, v) in zip(once, kept, strict=True)], axis=1)
     q = np.stack([v for _, v in kept], axis=1)
-    whole = np.linalg.norm(q, axis=1) > 0.5  # a quaternion of zeros is a packet not filled in
+    whole = np.linalg.norm(q, axis=1) > 0.5  # a quaternion of zeros is an unfilled packet
     if not whole.all():
         first = int(kept[0][0][~whole][0])
         read.findings.append(
@@ -311,13 +319,13 @@ _WIDEST_STEP_RAD = 0.1
 
 
 def _moves_as_it_says(t, r, v) -> np.ndarray:
-    """Samples whose position fits its neighbours' by the velocity, to 5 %: others carry a wrong time."""
+    """Samples whose position agrees with its neighbours' and the velocity to 5 %; others have a wrong time."""
     dt = np.diff(t)[:, None]
     miss = np.linalg.norm(np.diff(r, axis=0) - dt * (v[:-1] + v[1:]) / 2, axis=1)
     way = dt[:, 0] * np.linalg.norm(v[1:], axis=1)
     far = np.linalg.norm(np.diff(r, axis=0), axis=1) > 0.5 * np.linalg.norm(
         r[1:], axis=1
-    )  # too far apart for a chord to tell
+    )  # too far apart to be tested by a chord
     fits = np.concatenate(([True], (miss < 0.05 * way) | far, [True]))
     return fits[:-1] & fits[1:]
 
@@ -335,13 +343,13 @@ def _frame_at(channels: dict[str, Channel], tai_ns: np.ndarray):
         order = np.unique(p.tai_ns, return_index=True)
         columns.append(p.values[order[1][np.isin(order[0], common)]])
     state = np.stack(columns, axis=1)
-    fresh = np.concatenate(([True], np.any(np.diff(state, axis=0) != 0, axis=1)))  # a held position is an old one
+    fresh = np.concatenate(([True], np.any(np.diff(state, axis=0) != 0, axis=1)))  # a repeated position is stale
     at, state = common[fresh], state[fresh]
     sound = _moves_as_it_says((at - at[:1]) / NS, state[:, :3], state[:, 3:])
     at, r, v = at[sound], state[sound, :3], state[sound, 3:]
     if len(at) < 2:
         raise BadInput(
-            "the orbit's position does not move with its velocity",
+            "the orbit position does not change as its velocity predicts",
             channel="orbit_position",
             remedy="Check position_unit and velocity_unit in [orbit], and that both are in inertial axes.",
         )

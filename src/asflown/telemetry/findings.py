@@ -1,4 +1,4 @@
-"""What the door finds: counted, told by `telemetry check`, and a doubt of every result that uses the channels concerned."""
+"""Findings of the screening: counted, listed by `telemetry check`, and doubts of every result that uses the channels concerned."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Finding:
-    """Something noticed in a channel ('' for the whole file), with how often and where first."""
+    """One kind of fault found in a channel ('' for the whole file): how often, and where first."""
 
     channel: str
     what: str  # duplicate, conflict, disorder, repeat, spike, stuck, still, wrap, fall, norm, nan, gap, dropout, orbit, ignored, excluded
@@ -34,39 +34,47 @@ ERROR_TOO_FAST = Kind(
     "{channels}: the attitude error changes {ratio:.3g} times as fast as the body turns: are the values mrad or deg labelled {unit}?",
     "Check the unit in the heading or in the channel dictionary.",
 )  # fmt: skip
+NEVER_TOGETHER = Kind(
+    "telemetry.attitude-untested", Severity.NOTE,
+    "the direction of the quaternion cannot be tested: body rates and attitude are rarely known at the same time",
+)  # fmt: skip
+TURNS_TOO_LITTLE = Kind(
+    "telemetry.turns-too-little", Severity.NOTE,
+    "the direction of the quaternion cannot be tested: the body turns too little (rms rate {rms_rad_s:.2g} rad/s)",
+)  # fmt: skip
 RATE_SCALE = Kind(
     "telemetry.rate-scale", Severity.SUSPECT,
     "{channels}: the body rates are {ratio:.4g} times those of the quaternion: {guess}",
     "Check the unit of the body rates.",
 )  # fmt: skip
 
-#: Findings of the door -> the doubt they are.  Those that are missing here cost nothing: samples merely
-#: absent (gap, dropout), left out by the user (excluded), or not asked for (ignored).
+#: Finding -> its doubt.  Findings not listed here do no harm: samples that are missing (gap, dropout),
+#: excluded by the user (excluded), or not requested (ignored).
 OF_FINDING = {
     "duplicate": Kind("telemetry.duplicates", Severity.NOTE,
                       "{count} time stamps occur twice with the same values{where}; the first sample is used", _CHECK),
     "conflict": Kind("telemetry.conflicts", Severity.SUSPECT,
                      "{count} time stamps occur twice with different values{where}; the first sample is used", _CHECK),
-    "disorder": Kind("telemetry.disorder", Severity.CAUTION, "{count} samples arrived late and were sorted into place{where}", _CHECK),
+    "disorder": Kind("telemetry.disorder", Severity.CAUTION, "{count} late samples{where} were sorted by time", _CHECK),
     "repeat": Kind("telemetry.repeats", Severity.CAUTION,
                    "{count} samples repeat the previous value bit for bit{where}: stale frames", _CHECK),
     "spike": Kind("telemetry.spikes", Severity.CAUTION, "{count} spikes were left out{where}", _CHECK),
     "stuck": Kind("telemetry.stuck", Severity.CAUTION,
-                  "a noisy sensor says one value for {count} samples{where}; they were left out", _CHECK),
+                  "a noisy sensor repeats one value for {count} samples{where}; they were left out", _CHECK),
     "still": Kind("telemetry.still", Severity.CAUTION,
-                  "one value is repeated for {count} samples{where}: a dead sensor, or no motion? They are used", _CHECK),
-    "wrap": Kind("telemetry.wraps", Severity.NOTE, "{count} declared wraps were undone{where}"),
+                  "one value repeats for {count} samples{where}: a stuck sensor, or no motion? They are used", _CHECK),
+    "wrap": Kind("telemetry.wraps", Severity.NOTE, "{count} declared wraps were unwrapped{where}"),
     "fall": Kind("telemetry.falls", Severity.SUSPECT,
-                 "a counter falls or a value jumps over its whole range {count} times{where}: an undeclared wrap or a reset?",
+                 "a counter decreases or a value jumps over its whole range {count} times{where}: an undeclared wrap or a reset?",
                  "Declare the wrap in a channel dictionary, or divide the record at the reset."),
-    "norm": Kind("telemetry.norm", Severity.SUSPECT, "{count} quaternions are not of length one; they were left out", _CHECK),
-    "nan": Kind("telemetry.nan", Severity.NOTE, "{count} cells say 'nan'{where}; they count as blank"),
-    "orbit": Kind("telemetry.no-orbit", Severity.CAUTION, "{count} quaternions lie outside the known orbit; they were left out"),
+    "norm": Kind("telemetry.norm", Severity.SUSPECT, "{count} quaternions do not have unit length; they were left out", _CHECK),
+    "nan": Kind("telemetry.nan", Severity.NOTE, "{count} cells contain 'nan'{where}; they count as blank"),
+    "orbit": Kind("telemetry.no-orbit", Severity.CAUTION, "{count} quaternions were sampled while the orbit is not known; they were left out"),
 }  # fmt: skip
 
 
 def found_in(findings: Iterable[Finding], used: Iterable[str]) -> Doubts:
-    """One doubt a kind for the channels used; a finding about the whole file concerns them all."""
+    """One doubt of each kind for the channels used; a finding about the whole file concerns all of them."""
     used = set(used)
     by_kind: dict[str, list[Finding]] = {}
     for f in findings:

@@ -1,4 +1,4 @@
-"""A table that another program is still writing: the whole of it, again and again as it grows."""
+"""A table that another program is still writing, read again as it grows."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ def growing(
         if len(whole) != size:
             size, since = len(whole), time.monotonic()
             so_far = None
-            with suppress(BadInput):  # a header alone, or too few rows: more may come
+            with suppress(BadInput):  # a header alone, or too few rows: more may follow
                 so_far = _read(path, whole, read)
             if so_far is not None:
                 yield so_far, False
         elif time.monotonic() - since >= patience_s:
             if not whole:
                 raise BadInput(
-                    "nothing has been written there", file=path, remedy="Check the path, or raise --patience."
+                    "no data has been written to this file", file=path, remedy="Check the path, or raise --patience."
                 )
             yield _read(path, whole, read), True
             return
@@ -61,6 +61,8 @@ def _read(path: Path, whole: bytes, read) -> Telemetry:
         part = Path(folder) / path.name
         part.write_bytes(whole)
         try:
-            return replace(read(part), source=str(path))
+            telemetry = read(part)
+            inputs = tuple(i._replace(file=str(path)) if i.file == str(part) else i for i in telemetry.inputs)
+            return replace(telemetry, source=str(path), inputs=inputs)
         except BadInput as why:
             raise BadInput(why.what, remedy=why.remedy, file=path, channel=why.channel, time=why.time, line=why.line) from None  # fmt: skip

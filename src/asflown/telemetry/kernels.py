@@ -34,10 +34,10 @@ def trajectory_from_kernels(kernels: Sequence[str | Path], target: str, body: st
     names = [str(k) for k in kernels]
     for name in names:
         if not Path(name).is_file():
-            raise BadInput("there is no such kernel", file=name, remedy="Check the path.")
+            raise BadInput("this kernel does not exist", file=name, remedy="Check the path.")
     tai_ns = closest_ns + np.round(np.arange(-REACH_S, REACH_S + STEP_S, STEP_S) * NS).astype(np.int64)
     et = (tai_ns - int(et_to_tai_ns(0.0)[0])) / NS
-    et = et - (et_to_tai_ns(et) - tai_ns) / NS  # TDB runs up to 2 ms beside TAI
+    et = et - (et_to_tai_ns(et) - tai_ns) / NS  # TDB - TAI varies by up to 2 ms
     try:
         for name in names:
             spiceypy.furnsh(name)
@@ -47,9 +47,9 @@ def trajectory_from_kernels(kernels: Sequence[str | Path], target: str, body: st
     except spiceypy.exceptions.SpiceyError as why:
         short = str(getattr(why, "short", "")) or type(why).__name__
         raise BadInput(
-            f"the kernels do not give {target} from {body} in IAU_{body.upper()}: {short}",
+            f"the kernels do not provide {target} relative to {body} in IAU_{body.upper()}: {short}",
             file=some_of(names),
-            remedy=f"They must hold {target} and {body} within {REACH_S:g} s of closest approach, and the body's axes (an SPK and a PCK, or a metakernel).",
+            remedy=f"They must cover {target} and {body} within {REACH_S:g} s of closest approach, and the body's axes (an SPK and a PCK, or a metakernel).",
         ) from None
     finally:
         spiceypy.kclear()

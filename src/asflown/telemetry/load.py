@@ -1,4 +1,4 @@
-"""Telemetry from a file: any table in, checked channels in SI on a TAI axis out."""
+"""Telemetry from a file: checked channels in SI on a TAI axis."""
 
 from __future__ import annotations
 
@@ -20,14 +20,30 @@ CLOCKS = ("sclk", "ert", "ground_receipt", "scet", "utc", "time")
 def load_telemetry(path, *, channels=None, exclude=None, craft=None) -> Telemetry:
     """Read one telemetry file, screen it, and return its channels in SI.
 
-    path: CSV (plain or gzip), Parquet, NetCDF or HDF5.
-    channels: a channel dictionary (TOML) where the table does not describe itself.
-    exclude: a CSV of spans not to be used, with columns start, stop, channel, reason; start and stop
-        in seconds from the epoch or in UTC, '*' for all channels.
-    craft: a Craft, whose wheel rate limits sharpen the guard against rpm labelled rad/s.
+    Nothing is resampled.  Samples that must not be used are marked, not removed.
 
-    Nothing is resampled.  What was noticed is in ``findings`` and ``doubts``, and samples that must not
-    be used are marked.  Raises BadInput, naming file, line, channel or time, for anything it cannot read.
+    Parameters
+    ----------
+    path : str or Path
+        CSV (plain or gzip), Parquet, NetCDF or HDF5.
+    channels : str or Path, optional
+        Channel dictionary (TOML), where the table does not describe itself; docs/telemetry.md lists its keys.
+    exclude : str or Path, optional
+        CSV of spans not to be used, with columns start, stop, channel, reason; start and stop in seconds from the
+        epoch or in UTC, '*' for all channels.
+    craft : Craft, optional
+        Its wheel rate limits improve the test for rpm labelled rad/s.
+
+    Returns
+    -------
+    Telemetry
+        Channels by name, each at its own times (TAI), with ``findings`` and ``doubts`` of the screening.
+
+    Raises
+    ------
+    BadInput
+        Names file, line, channel or time of what cannot be read: a missing file, an unknown channel or unit, a cell
+        that is not a number, time running backwards, a quaternion against the body rates.
     """
     from .attitude import check_attitude
     from .screening import screen
@@ -69,7 +85,7 @@ def _bytes(path: Path) -> bytes:
     try:
         data = path.read_bytes()
     except IsADirectoryError:
-        raise BadInput("this is a directory", remedy="Give one file.") from None
+        raise BadInput("this is a directory, not a file", remedy="Give one file.") from None
     except FileNotFoundError:
         raise BadInput("there is no such file", remedy="Check the path.") from None
     except (OSError, ValueError) as why:
@@ -80,14 +96,15 @@ def _bytes(path: Path) -> bytes:
 
 
 def _tables(path: Path, data: bytes) -> list[Table]:
-    """What the file holds, by its first bytes; the suffix only says what was hoped for."""
+    """The tables of a file, whose format its first bytes give; the suffix is only checked against it."""
     if data[:4] == b"PAR1":
         return [read_parquet(path)]
     if data[:8] == b"\x89HDF\r\n\x1a\n" or data[:3] == b"CDF":
         return read_netcdf(path)
     if path.suffix in (".parquet", ".nc", ".h5", ".hdf5", ".hdf"):
         raise BadInput(
-            f"its name says {path.suffix}, its content does not", remedy="Copy the file again, or correct its suffix."
+            f"the content is not {path.suffix}, as the file name says",
+            remedy="Copy the file again, or correct its suffix.",
         )
     return [read_csv(data)]
 
@@ -103,7 +120,7 @@ def _self_described(tables: list[Table]) -> Read:
 
 
 def _headed(table: Table) -> tuple[list[Use], list[int]]:
-    """What each heading after the first asks for: channels, and further clocks to keep."""
+    """What each heading after the first names: a channel, or a further clock to keep."""
     uses, clocks = [], []
     for j, heading in enumerate(table.headings[1:], 1):
         name, unit = split_header(heading) or (heading.strip(), None)
@@ -119,7 +136,7 @@ def _headed(table: Table) -> tuple[list[Use], list[int]]:
                 remedy="Write 'name [unit]', as in 'body_rate_x [rad/s]'; [] is dimensionless.",
             )
         uses.append(Use(j, name, unit or ""))
-        to_si(name, unit or "")  # an unknown name or unit is told before any cell
+        to_si(name, unit or "")  # report an unknown name or unit before any cell
     return uses, clocks
 
 
@@ -131,7 +148,7 @@ def _is_state(name: str) -> bool:
 
 
 def read_exclusions(path, telemetry: Telemetry) -> list[Exclusion]:
-    """Spans not to be used: CSV with start, stop (seconds from the epoch, or UTC), channel ('*': all), reason.
+    """Spans to exclude: CSV with start, stop (seconds from the epoch, or UTC), channel ('*': all), reason.
 
     Raises BadInput for a missing column, a span that ends before it starts, or one without a reason."""
     path = Path(path)
@@ -153,7 +170,9 @@ def read_exclusions(path, telemetry: Telemetry) -> list[Exclusion]:
                 raise BadInput(why.what, line=table.line(row), remedy=why.remedy) from None
             if not entry["reason"] or stop < start:
                 what = "the span ends before it starts" if entry["reason"] else "no reason is given"
-                raise BadInput(what, line=table.line(row), remedy="Every exclusion says from when, to when and why.")
+                raise BadInput(
+                    what, line=table.line(row), remedy="Every exclusion needs a start, a later stop and a reason."
+                )
             found.append(Exclusion(entry["channel"] or "*", start, stop, entry["reason"]))
     except BadInput as why:
         raise why.within(path) from None

@@ -1,7 +1,7 @@
 """Screening: what is wrong with received samples, counted, and marked where it must not be used.
 
-Nothing is repaired except the order of time and declared wraps.  Each test asks what the channel's
-own noise and quantisation would produce by themselves, and speaks only where that does not do.
+Only the order of time and declared wraps are repaired.  Each test asks what the channel's own noise and
+quantisation would produce, and reports only what they do not explain.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from scipy.ndimage import median_filter
 from scipy.special import pdtrc
 
 from ..kit.errors import BadInput
+from ..kit.scatter import MEDIAN_SIZE, difference_sigma
 from ..kit.timeline import NS, segments
 from .channels import kind_of
 from .findings import ERROR_TOO_FAST, IMPLAUSIBLE, RATE_SCALE, Finding
@@ -23,13 +24,13 @@ from .telemetry import BRIDGED, Channel, Telemetry
 if TYPE_CHECKING:
     from ..kit.doubts import Doubt
 
-SPIKE_SIGMAS = 20.0  # far beyond any noise; kicks of a sticking wheel reach 10 on their own channel
+SPIKE_SIGMAS = 20.0  # far beyond noise; kicks of a sticking wheel reach 10 on their own channel
 AGREE = 0.2  # a spike's neighbours differ among themselves by less than this part of its height
 STUCK_RUN = 10  # samples; shorter runs of one value are repeats
-LATE_FEW, LATE_PART = 3, 0.01  # this many late samples are disorder, more is a clock running backwards
-CHANCE = 1e-6  # what noise and quantisation do by chance less often than this, they did not do
+LATE_FEW, LATE_PART = 3, 0.01  # up to this many late samples count as disorder, more as a clock running backwards
+CHANCE = 1e-6  # significance: an event less probable than this is not due to noise and quantisation
 
-#: Quantities that never stand still bit for bit while their sensor is noisy: a repeated value is stale.
+#: Quantities whose noise never repeats bit for bit: a repeated value is stale.
 _MEASURED = frozenset({
     "wheel_rate", "body_rate", "attitude_error", "rate_error", "controller_rate_error", "quaternion",
     "wheel_momentum", "wheel_momentum_magnitude", "orbit_position", "orbit_velocity",
@@ -38,14 +39,14 @@ _MEASURED = frozenset({
 #: Doubts that a unit is not the one written.
 _OF_UNITS = (IMPLAUSIBLE, ERROR_TOO_FAST, RATE_SCALE)
 
-#: Findings after which a person should look before the data are used (exit code 3 of `telemetry check`).
+#: Findings that need inspection before the data are used (exit code 3 of `telemetry check`).
 SERIOUS = frozenset({"conflict", "spike", "stuck", "norm", "fall"})
 
 
 def screen(telemetry: Telemetry, craft=None) -> Telemetry:
     """The same telemetry in order of time, with findings, doubts and unusable samples marked.
 
-    ``craft`` gives the wheels' rate limits to the guard against rpm labelled rad/s, nothing else.
+    ``craft`` serves only to test wheel rates against its rate limits (rpm labelled rad/s).
     Raises BadInput where time runs backwards for more than a few samples."""
     channels, findings = _in_order(telemetry)
     for name, c in list(channels.items()):
@@ -97,8 +98,8 @@ def _in_order(telemetry: Telemetry) -> tuple[dict[str, Channel], list[Finding]]:
     found = []
     for what, instants, detail in (
         ("disorder", late, "late samples, sorted into place"),
-        ("duplicate", identical - differing, "time stamps given twice with the same values; the first is kept"),
-        ("conflict", differing, "time stamps given twice with different values; the first is kept"),
+        ("duplicate", identical - differing, "time stamps occur twice with the same values; the first is kept"),
+        ("conflict", differing, "time stamps occur twice with different values; the first is kept"),
     ):
         if instants:
             found.append(Finding("", what, len(instants), min(instants), detail))
@@ -106,7 +107,7 @@ def _in_order(telemetry: Telemetry) -> tuple[dict[str, Channel], list[Finding]]:
 
 
 def _late(c: Channel, telemetry: Telemetry) -> np.ndarray:
-    """Which samples stand out of order: all but a longest non-decreasing subsequence."""
+    """Samples out of order: all but a longest non-decreasing subsequence."""
     from bisect import bisect_right
 
     tails: list[int] = []
@@ -164,37 +165,30 @@ def dropouts(c: Channel) -> list[tuple[int, int]]:
 
 
 def _is_regular(c: Channel) -> bool:
-    """A channel sampled on events has no cadence to miss."""
+    """A channel sampled on events has no cadence, so no gaps."""
     steps, cadence = np.diff(c.tai_ns), c.cadence_ns
     return len(steps) >= 2 and bool(np.mean(np.abs(steps - cadence) < 0.3 * cadence) > 0.5)
 
 
 # ---- noise and quantisation -------------------------------------------------------------------------
 
+_MEDIAN_OF_SECOND = MEDIAN_SIZE * 6**0.5  # median |x0 - 2 x1 + x2| of unit white noise
+
 
 def noise_sigma(c: Channel) -> float:
     """White noise of one sample, from local second differences (median, so events do not count). SI
 
-    0 where more than half of them vanish: the noise is then below the quantisation step."""
-    return float(np.median(np.abs(_second_differences(c))) / _MEDIAN_OF_SECOND) if len(c.tai_ns) >= 5 else 0.0
-
-
-_MEDIAN_OF_SECOND = 0.6744897501960817 * 6**0.5  # median |x0 - 2 x1 + x2| of unit white noise
-
-
-def _second_differences(c: Channel) -> np.ndarray:
-    """x0 - 2 x1 + x2 of samples that follow each other at the cadence, without the others."""
+    0 where more than half of them are zero: the noise is then below the quantisation step."""
+    if len(c.tai_ns) < 5:
+        return 0.0
     v, steps = c.usable.values, np.diff(c.usable.tai_ns)
-    if len(v) < 3:
-        return np.zeros(1)
-    even = np.abs(steps - c.cadence_ns) <= 0.5 * c.cadence_ns
-    even = even[:-1] & even[1:]
-    found = (v[:-2] - 2 * v[1:-1] + v[2:])[even]
-    return found if len(found) else np.zeros(1)
+    even = np.abs(steps - c.cadence_ns) <= 0.5 * c.cadence_ns  # samples that follow each other at the cadence
+    sigma = difference_sigma(v, 2, even[:-1] & even[1:])
+    return sigma if np.isfinite(sigma) else 0.0
 
 
 def quantisation_step(values: np.ndarray) -> float:
-    """The step all values are multiples of, from their smallest differences. SI; 0 where none shows."""
+    """The step all values are multiples of, from their smallest differences. SI; 0 where there is none."""
     levels = np.unique(values)
     steps = np.diff(levels)
     steps = steps[steps > 1e-12 * np.maximum(np.abs(levels[1:]), np.abs(levels[:-1]))]
@@ -206,7 +200,7 @@ def quantisation_step(values: np.ndarray) -> float:
         near = steps[steps < 1000 * q]
         counts = np.rint(near / q)
         q = float(near @ counts / (counts @ counts))
-        # twenty differences that all happen to be multiples are no accident, however sparse the levels
+        # twenty differences that are all multiples are not a coincidence, however sparse the levels
         if np.quantile(np.abs(near / q - counts), 0.99) < 0.1 and len(near) >= min(20, 0.5 * len(steps)):
             return q
     return 0.0
@@ -216,7 +210,7 @@ def quantisation_step(values: np.ndarray) -> float:
 
 
 def _unwrapped(c: Channel) -> tuple[Channel, list[Finding]]:
-    """A declared wrap undone within each gap-free stretch; across a gap the turns are not known."""
+    """Unwrap a declared modulus within each gap-free stretch; across a gap the number of turns is not known."""
     if c.modulus <= 0:
         return c, []
     values, count, first = c.values.copy(), 0, 0
@@ -227,20 +221,20 @@ def _unwrapped(c: Channel) -> tuple[Channel, list[Finding]]:
             first = first or int(c.tai_ns[part][1:][jumps][0])
             count += int(jumps.sum())
     c = replace(c, values=values, modulus=0.0)
-    return c, [Finding(c.name, "wrap", count, first, "wraps at the declared modulus, undone")] if count else []
+    return c, [Finding(c.name, "wrap", count, first, "wraps at the declared modulus, unwrapped")] if count else []
 
 
 def _without_spikes(c: Channel) -> tuple[Channel, list[Finding]]:
     """Single samples far off both neighbours, which agree with each other and with theirs.
 
-    A kick, a step or the apex of a triangle has at least one neighbour on its way: those stay."""
+    A kick, a step or the apex of a triangle has at least one neighbour between: those are kept."""
     n = len(c.values)
     if c.kind.behaves == "steps" or n < 7:
         return c, []
     x = np.pad(c.values, 2, mode="edge")
     before2, before, here, after, after2 = x[:-4], x[1:-3], c.values, x[3:-1], x[4:]
     height = np.abs(here - (before + after) / 2)
-    # noise may change with time: the larger of the whole record's and that of about 30 samples
+    # noise may change with time: the larger of the whole record's and that of about 30 samples, by a running median
     bend = np.abs(before - 2 * here + after)
     sigma = max(float(np.median(bend)), 1e-12 * float(np.max(np.abs(here)))) / _MEDIAN_OF_SECOND
     local = median_filter(bend, min(31, n), mode="nearest") / _MEDIAN_OF_SECOND
@@ -254,11 +248,11 @@ def _without_spikes(c: Channel) -> tuple[Channel, list[Finding]]:
 
 
 def _without_stuck(c: Channel) -> tuple[Channel, list[Finding]]:
-    """A noisy sensor that says one value for a long run."""
+    """A noisy sensor that repeats one value for a long run."""
     if c.kind.stem not in _MEASURED or len(c.values) < 3 * STUCK_RUN:
         return c, []
     if (c.values == c.values[0]).all():
-        detail = f"one value throughout, {c.values[0]:g}: a dead sensor, or nothing moves by one count? Still used"
+        detail = f"the same value throughout, {c.values[0]:g}: a stuck sensor, or motion below one count? Used"
         return c, [Finding(c.name, "still", len(c.values), int(c.tai_ns[0]), detail)]
     stuck, still = np.zeros(len(c.values), bool), np.zeros(len(c.values), bool)
     step = quantisation_step(c.values)
@@ -271,21 +265,21 @@ def _without_stuck(c: Channel) -> tuple[Channel, list[Finding]]:
         natural = (np.sum(change == 0) + 1) / (len(change) + 2)
         if natural ** (stop - start) > CHANCE:
             continue
-        # differences of noise are anticorrelated (-1/2); those of a smooth motion come to rest are not
+        # differences of noise are anticorrelated (-1/2); those of a smooth motion that comes to rest are not
         noisy = np.sum(change[1:] * change[:-1]) < -0.2 * np.sum(change**2)
-        rest = c.kind.stem == "wheel_rate" and c.values[stop] == 0  # a wheel at rest says exactly zero
+        rest = c.kind.stem == "wheel_rate" and c.values[stop] == 0  # a wheel at rest reads exactly zero
         abrupt = np.median(np.abs(change[-5:])) > max(5 * step, 0.3 * np.median(np.abs(change)))
         if not rest and (noisy or abrupt):
             (stuck if noisy else still)[start + 1 : stop + 1] = True
-    c, found = _marked(c, stuck, "stuck", "samples of one value after noisy ones, not used")
+    c, found = _marked(c, stuck, "stuck", "samples repeat one value after noisy ones; not used")
     if still.any():
-        detail = "samples of one value after motion: a stuck sensor, or rest? Still used"
+        detail = "samples repeat one value after motion: a stuck sensor, or rest? Used"
         found.append(Finding(c.name, "still", int(still.sum()), int(c.tai_ns[still][0]), detail))
     return c, found
 
 
 def _without_repeats(c: Channel) -> tuple[Channel, list[Finding]]:
-    """Short runs of one value in a noisy channel, where the quantisation makes them too rarely by itself."""
+    """Short runs of one value in a noisy channel, more frequent than quantisation produces."""
     change = np.diff(c.values)
     if c.kind.stem not in _MEASURED | {"control_torque"} or len(change) < 20 or not change.any():
         return c, []
@@ -300,26 +294,31 @@ def _without_repeats(c: Channel) -> tuple[Channel, list[Finding]]:
         if inside and stop - start < STUCK_RUN - 1 and min(abs(change[start - 1]), abs(change[stop])) > 3 * step:
             repeated[start + 1 : stop + 1] = True
             isolated += 1
-    # by itself, no change is about as frequent as any other small change of a step's width
+    # from quantisation alone, no change is about as frequent as any other small change of one step
     width = max(5 * step, float(np.quantile(moves, 0.1)))
     expected = 1.5 * np.sum(moves <= width) * step / (2 * width)
     if isolated == 0 or pdtrc(isolated - 1, expected) > CHANCE:
         return c, []
     if c.kind.stem == "control_torque":  # a command may be held
         first = int(c.tai_ns[repeated][0])
-        return c, [Finding(c.name, "repeat", int(repeated.sum()), first, "the last value again, bit for bit")]
-    return _marked(c, repeated, "repeat", "the last value again, bit for bit: stale, not used")
+        return c, [
+            Finding(c.name, "repeat", int(repeated.sum()), first, "samples repeat the previous value bit for bit")
+        ]
+    return _marked(c, repeated, "repeat", "samples repeat the previous value bit for bit: stale, not used")
 
 
 def _falls(c: Channel) -> list[Finding]:
-    """Cumulative counts that fall, and sawteeth: wraps or resets that nobody declared."""
+    """Cumulative counts that decrease, and sawteeth: undeclared wraps or resets."""
     x, t = c.usable.values, c.usable.tai_ns
     if len(x) < 6:
         return []
     jump = np.diff(x)
-    if c.kind.behaves == "cumulative":
+    if c.kind.stem == "accelerometer_count":  # counts down as well as up, by thrust and by its own bias
+        hit = np.abs(jump) > max(0.5 * float(np.ptp(x)), 50 * float(np.median(np.abs(jump))) + 1)
+        detail = "jumps over much of its range: a wrap (declare it in a channel dictionary) or a reset"
+    elif c.kind.behaves == "cumulative":
         hit = jump < 0
-        detail = "falls though it is cumulative: a wrap (declare it in a channel dictionary) or a reset"
+        detail = "decreases although it is cumulative: a wrap (declare it in a channel dictionary) or a reset"
     elif c.kind.stem in ("wheel_rate", "attitude_error"):
         hit = np.abs(jump) > max(0.75 * np.ptp(x), 50 * noise_sigma(c))
         for i in np.flatnonzero(hit):
@@ -328,7 +327,7 @@ def _falls(c: Channel) -> list[Finding]:
                 np.sign(d.mean()) if len(d) and np.abs(d.sum()) > 3 * noise_sigma(c) else 0 for d in (before, after)
             ]
             hit[i] = drift[0] == drift[1] == -np.sign(jump[i])
-        detail = "jumps over its whole range against its own drift: a wrap that is not declared?"
+        detail = "jumps over its whole range against its own drift: an undeclared wrap?"
     else:
         return []
     if not hit.any():
@@ -356,7 +355,7 @@ def _marked(c: Channel, hit: np.ndarray, what: str, detail: str) -> tuple[Channe
 
 
 def _without_repeated_frames(channels: dict[str, Channel]) -> tuple[dict[str, Channel], list[Finding]]:
-    """Instants at which every noisy channel sampled together says its last value again."""
+    """Instants at which all noisy channels sampled together repeat their previous values."""
     frames: dict[bytes, list[str]] = {}
     for name, c in channels.items():
         if c.kind.stem in _MEASURED and len(c.values) >= 20 and np.any(np.diff(c.values)):
@@ -366,7 +365,7 @@ def _without_repeated_frames(channels: dict[str, Channel]) -> tuple[dict[str, Ch
         same = np.array([np.diff(channels[n].values) == 0 for n in names])
         whole = np.all(same, axis=0)
         by_chance = np.prod(same.mean(axis=1)) * whole.size
-        # a long run of still frames, or one at either end, is rest and not repetition
+        # a long run of equal frames, or one at either end, is rest and not repetition
         for start, stop in _runs(whole):
             whole[start:stop] = start > 0 and stop < whole.size and stop - start < STUCK_RUN - 1
         if len(names) < 3 or not whole.any() or pdtrc(whole.sum() - 1, min(by_chance, 1e-3 * whole.size)) > CHANCE:
@@ -376,13 +375,13 @@ def _without_repeated_frames(channels: dict[str, Channel]) -> tuple[dict[str, Ch
             channels[n] = replace(channels[n], valid=channels[n].valid & ~hit)
         first = int(channels[names[0]].tai_ns[hit][0])
         findings.append(
-            Finding("", "repeat", int(hit.sum()), first, f"whole frames of {len(names)} channels again, bit for bit: not used")
+            Finding("", "repeat", int(hit.sum()), first, f"frames of {len(names)} channels repeat the previous frame bit for bit; not used")
         )  # fmt: skip
     return channels, findings
 
 
 def _whole_quaternions(channels: dict[str, Channel]) -> tuple[dict[str, Channel], list[Finding]]:
-    """A quaternion is used whole: four components at one instant, of length one."""
+    """A quaternion is used only with all four components at one instant and unit length."""
     names = [f"quaternion_{m}" for m in "wxyz"]
     if not all(n in channels for n in names):
         return channels, []
@@ -401,11 +400,11 @@ def _whole_quaternions(channels: dict[str, Channel]) -> tuple[dict[str, Channel]
         channels[n] = replace(p, valid=valid)
     if not off.any():
         return channels, []
-    return channels, [Finding("quaternion_w", "norm", int(off.sum()), int(instants[off][0]), "quaternions not of length one, not used")]  # fmt: skip
+    return channels, [Finding("quaternion_w", "norm", int(off.sum()), int(instants[off][0]), "quaternions do not have unit length; not used")]  # fmt: skip
 
 
 def _implausible(channels: dict[str, Channel], craft) -> list[Doubt]:
-    """Magnitudes no spacecraft has: most often a unit written in the heading that is not the column's."""
+    """Implausible magnitudes: most often the unit in the heading is not that of the column."""
     limits = {} if craft is None else {w.name: w.rate_limit for w in craft.wheels if w.rate_limit}
     beyond: dict[tuple[str, float, str], list[tuple[str, float]]] = {}
     for c in channels.values():
@@ -416,7 +415,7 @@ def _implausible(channels: dict[str, Channel], craft) -> list[Doubt]:
         if limit is None or not c.valid.any():
             continue
         size = np.abs(c.usable.values)
-        if np.mean(size > limit) > 0.01:  # a passing outlier is no matter of units
+        if np.mean(size > limit) > 0.01:  # a short outlier is not a wrong unit
             beyond.setdefault((kind.stem, limit, whose), []).append((c.name, float(np.max(size))))
     doubts = []
     for (stem, limit, whose), those in beyond.items():
@@ -436,12 +435,12 @@ def _implausible(channels: dict[str, Channel], craft) -> list[Doubt]:
     return doubts
 
 
-# ---- a summary a person can scan -----------------------------------------------------------------------
+# ---- summary -----------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class ChannelSummary:
-    """One channel in a line: how it was sampled and what is odd about it.  SI, seconds from the epoch."""
+    """One channel in a line: how it was sampled, and what is suspicious.  SI, seconds from the epoch."""
 
     name: str
     unit: str
@@ -484,5 +483,5 @@ def summaries(telemetry: Telemetry) -> list[ChannelSummary]:
 
 
 def needs_a_look(telemetry: Telemetry) -> bool:
-    """Whether a person should look before the data are used: something serious was found, or a unit is doubted."""
+    """Whether the data need inspection before use: a serious finding, or a doubted unit."""
     return telemetry.doubts.has(*_OF_UNITS) or any(f.what in SERIOUS for f in telemetry.findings)

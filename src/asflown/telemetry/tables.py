@@ -1,6 +1,6 @@
 """Tables on disk: CSV, Parquet and NetCDF/HDF5 read as headed columns, and telemetry written the same way.
 
-A reader says nothing about meaning.  It gives headings, cells and line numbers; what a column is
+A reader does not interpret.  It gives headings, cells and line numbers; the meaning of a column
 comes from its heading (``load``) or from a channel dictionary (``dictionary``).
 """
 
@@ -63,9 +63,9 @@ class Table:
 
 
 def numbers_of(table: Table, column: int, channel: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The numbers of one column: rows sampled (int), their values (float64), rows that said 'nan'.
+    """The numbers of one column: rows sampled (int), their values (float64), rows that contain 'nan'.
 
-    A blank is 'not sampled then'.  Raises BadInput for a cell that is no finite number, with its line.
+    A blank is 'not sampled then'.  Raises BadInput for a cell that is not a finite number, with its line.
     """
     cells = table.columns[column]
     if isinstance(cells, np.ndarray) and cells.dtype.kind in "fiub":
@@ -75,7 +75,7 @@ def numbers_of(table: Table, column: int, channel: str) -> tuple[np.ndarray, np.
     else:
         rows, texts = _sampled(cells)
         try:
-            if "_" in "".join(texts):  # Python reads 1_000 as a number; nobody writes telemetry so
+            if "_" in "".join(texts):  # Python reads 1_000 as a number; telemetry is never written so
                 raise ValueError
             values = np.fromiter(map(float, texts), float, len(texts))
         except ValueError:
@@ -84,7 +84,7 @@ def numbers_of(table: Table, column: int, channel: str) -> tuple[np.ndarray, np.
                 f"{_shown(texts[bad])} is not a number",
                 line=table.line(rows[bad]),
                 channel=channel,
-                remedy="A cell holds a number, or nothing where the channel was not sampled.",
+                remedy="Write a number, or leave the cell blank where the channel was not sampled.",
             ) from None
         nan = np.isnan(values)
         rows, values, said_nan = rows[~nan], values[~nan], rows[nan]
@@ -122,7 +122,7 @@ def times_of(table: Table, column: int, scale: str, origin_ns: int = 0) -> np.nd
     """One column as int64 ns TAI, every row; ``origin_ns`` is the zero of scale 's'.
 
     Seconds are read as decimals, so that nothing is lost far from their origin.
-    Raises BadInput for a blank, a cell that is no time, or one beyond the calendar."""
+    Raises BadInput for a blank, a cell that is not a time, or one beyond the calendar."""
     cells = table.columns[column]
     if isinstance(cells, np.ndarray) and cells.dtype.kind == "M":
         cells = ["" if np.isnat(c) else str(c) for c in cells.astype("datetime64[ns]")]
@@ -158,7 +158,7 @@ def times_of(table: Table, column: int, scale: str, origin_ns: int = 0) -> np.nd
 
 
 def whole_second(tai_ns: int) -> int:
-    """The whole second at or before an instant: an epoch that a label can say exactly."""
+    """The whole second at or before an instant: an epoch that a label represents exactly."""
     return (int(tai_ns) + 1000) // NS * NS  # a microsecond short of a second is that second
 
 
@@ -214,9 +214,9 @@ def read_csv(data: bytes) -> Table:
     other = next((w for s, w in ((";", "semicolons"), ("\t", "tabs"), ("|", "bars")) if s in headings[0]), None)
     if len(headings) == 1 and other:
         raise BadInput(
-            f"the cells are divided by {other}",
+            f"the cells are separated by {other}",
             line=lines[0],
-            remedy="Save the table with commas between its cells and points as decimal signs.",
+            remedy="Separate cells by commas, and use a point as the decimal sign.",
         )
     while len(headings) > 1 and headings[-1] == "" and all(len(r) == len(rows[0]) and not r[-1].strip() for r in rows):
         headings.pop()  # a comma at the end of every line
@@ -224,7 +224,7 @@ def read_csv(data: bytes) -> Table:
     for number, row in zip(lines, rows, strict=True):
         if len(row) != len(headings):
             raise BadInput(
-                f"{len(row)} cells where the header has {len(headings)}",
+                f"the row has {len(row)} cells, the header {len(headings)}",
                 line=number,
                 remedy="Every row has one cell per column; leave a cell blank where a channel was not sampled.",
             )
@@ -238,13 +238,13 @@ def _text(data: bytes) -> str:
             data = gzip.decompress(data)
         except (EOFError, OSError, zlib.error) as why:
             raise BadInput(
-                f"the gzip file is cut short or damaged ({why})", remedy="Copy the file again from its source."
+                f"the gzip file is truncated or damaged ({why})", remedy="Copy the file again from its source."
             ) from None
     if not data.strip():
         raise BadInput("the file is empty", remedy="Give a table with a header line and at least one row.")
     try:
         if b"\0" in data:
-            raise ValueError("it holds zero bytes")
+            raise ValueError("the file contains zero bytes (NUL)")
         return data.decode("utf-8-sig")
     except (UnicodeDecodeError, ValueError) as why:
         raise BadInput(
@@ -258,7 +258,7 @@ def _checked(table: Table) -> Table:
     if twice:
         raise BadInput(f"the header names a column twice: {some_of(twice)}", remedy="Keep one of them, or rename one.")
     if len(table) == 0:
-        raise BadInput("the table has a header and no rows", remedy="Give at least one row.")
+        raise BadInput("the table has a header but no rows", remedy="Give at least one row.")
     return table
 
 
@@ -319,7 +319,7 @@ def read_netcdf(path: Path) -> list[Table]:
             f"HDF5 cannot be read here ({str(why)[:100]})",
             remedy="Install the package it names, or save the table as CSV or Parquet.",
         ) from None
-    except Exception as why:  # h5py, h5netcdf and xarray have no common error
+    except Exception as why:  # h5py, h5netcdf and xarray share no base exception
         raise BadInput(
             f"the NetCDF/HDF5 file cannot be read ({str(why).splitlines()[0][:200] if str(why) else type(why).__name__})",
             remedy="Copy the file again, or write it anew.",
@@ -338,14 +338,14 @@ def read_netcdf(path: Path) -> list[Table]:
         tables.append(_checked(Table((heading, *names), (seconds, *columns), (), epoch)))
     if not tables:
         raise BadInput(
-            f"no variable stands on a time coordinate (variables: {some_of(data.variables)})",
+            f"no variable has a time coordinate (variables: {some_of(data.variables)})",
             remedy="Each channel is a one-dimensional variable with its time as a coordinate, in units 'seconds since …'.",
         )
     return tables
 
 
 def _clock(data, dim) -> str | None:
-    """The variable that holds the times of a dimension."""
+    """The variable with the times of a dimension."""
     if dim in data.variables:
         return dim
     named = [
@@ -364,7 +364,7 @@ def _cf_time(clock, epoch) -> tuple[np.ndarray, str, str | None]:
         return values, f"time [{units}]", None
     factor = 86_400.0 if unit.lower() in ("day", "days", "d") else si_factor(_CF_UNITS.get(unit.lower(), unit), "s")
     if values.dtype.kind not in "fiu":
-        raise BadInput(f"the time coordinate {clock.name!r} holds no numbers", remedy="Write times as numbers with CF units.")  # fmt: skip
+        raise BadInput(f"the time coordinate {clock.name!r} is not numeric", remedy="Store times as numbers with CF units.")  # fmt: skip
     if since:
         epoch = re.sub(r"(\.0+)?\s*(Z|UTC|[+-]00:?00)?$", "", start.strip()).replace(" ", "T")
     return values if factor == 1 else values * factor, "time [s]", None if epoch is None else str(epoch)
@@ -395,7 +395,7 @@ def divided(table: Table, time: int, channel: int, value: int, unit: int | None)
     units = [str(c).strip() for c in table.columns[unit]] if unit is not None else None
     for i, name in enumerate(names):
         if not name:
-            raise BadInput("no channel is named here", line=table.line(i), remedy="Name the channel in every row.")
+            raise BadInput("this row names no channel", line=table.line(i), remedy="Name the channel in every row.")
         rows.setdefault(name if units is None else f"{name} [{units[i]}]", []).append(i)
     return [table.take(np.array(r), (time, value), (table.headings[time], name)) for name, r in rows.items()]
 
@@ -404,12 +404,23 @@ def divided(table: Table, time: int, channel: int, value: int, unit: int | None)
 
 
 def write_table(telemetry: Telemetry, path: str | Path) -> None:
-    """Write telemetry as a self-describing table: CSV, gzip CSV (.gz) or Parquet, by suffix.
+    """Write telemetry as a self-describing table.
 
-    One row per instant, SI units in the headings, blanks where a channel was not sampled; every value
-    is written so that it reads back bit for bit.  Samples marked unusable are written too: a table
-    holds what was received, not what was thought of it.  Nothing half-written stays behind.
-    Raises BadInput where the file cannot be written."""
+    One row per instant, SI units in the headings, blanks where a channel was not sampled.  Every value reads back bit
+    for bit.  Samples marked as unusable are written too.  No partial file remains.
+
+    Parameters
+    ----------
+    telemetry : Telemetry
+        The channels to write, with their epoch and further time columns.
+    path : str or Path
+        The suffix gives the format: .parquet, .gz (gzip CSV), else CSV.
+
+    Raises
+    ------
+    BadInput
+        Where the file cannot be written.
+    """
     path = Path(path)
     rows_ns = [c.tai_ns for c in telemetry.channels.values()]
     if telemetry.time_labels:
@@ -431,7 +442,9 @@ def write_table(telemetry: Telemetry, path: str | Path) -> None:
             _write_csv(columns, epoch, place, packed=path.suffix == ".gz")
 
     if not path.parent.is_dir():
-        raise BadInput("the table cannot be written (no such folder)", file=path, remedy="Give another place.")
+        raise BadInput(
+            "the table cannot be written (the folder does not exist)", file=path, remedy="Choose another folder."
+        )
     write_whole(path, write)
 
 

@@ -1,7 +1,7 @@
-"""Telemetry inside the house: channels with validity, an epoch, and what was found wrong.
+"""Telemetry: channels with validity, an epoch, and the findings of the screening.
 
-Nothing here is resampled.  A channel holds only the instants at which it was sampled, in TAI, with
-a flag for each that says whether it may be used; exclusions say why it may not.
+Nothing is resampled.  A channel holds the instants at which it was sampled, in TAI, each with a flag
+whether it may be used; exclusions give the reason why not.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 #: Runs of at most this many missing samples are bridged; longer ones are gaps.
 BRIDGED = 5
 
-LONGEST_S = 4_000_000_000  # seconds from any epoch that int64 nanoseconds hold with room to spare
+LONGEST_S = 4_000_000_000  # seconds from any epoch that int64 nanoseconds hold with a margin
 
 
 @dataclass(frozen=True)
 class Exclusion:
-    """A span of one channel ('*': all) that is not to be used, and why."""
+    """A span of one channel ('*': all) that must not be used, and the reason."""
 
     channel: str
     start_ns: int
@@ -39,43 +39,78 @@ class Exclusion:
 
 @dataclass(frozen=True)
 class Channel:
-    """One channel, in SI, at its own sample times (int64 ns TAI, increasing)."""
+    """One channel, in SI, at its own sample times.
+
+    Attributes
+    ----------
+    name : str
+        As in docs/telemetry.md: 'wheel_rate_RWA1'.
+    tai_ns : ndarray of int64, shape (N,)
+        Sample times, ns TAI, increasing.
+    values : ndarray of float64 or str, shape (N,)
+        In the SI unit of the channel's kind; words for a state channel.
+    valid : ndarray of bool, shape (N,)
+        Which samples may be used.
+    """
 
     name: str
     tai_ns: np.ndarray
     values: np.ndarray  # float64, or str for a state channel
     valid: np.ndarray
     unit_given: str = ""
-    count_size: float = 0.0  # SI size of one count, where the dictionary tells it
+    count_size: float = 0.0  # SI size of one count, where the dictionary gives it
     modulus: float = 0.0  # SI; values wrap at it and are still to be unwrapped (0: they do not)
 
     @property
     def kind(self) -> ChannelKind:
+        """Its family: unit, meaning, behaviour."""
         return kind_of(self.name)
 
     @property
     def member(self) -> str:
+        """The part of the name after the family's: axis, wheel, thruster or mechanism."""
         return member_of(self.name)
 
     @property
     def cadence_ns(self) -> int:
+        """Median step of its samples. [ns]"""
         return cadence_ns(self.tai_ns)
 
     @property
     def usable(self) -> Channel:
+        """The channel with its usable samples only."""
         return self if self.valid.all() else self.where(self.valid)
 
     def where(self, mask) -> Channel:
+        """The channel with the samples of ``mask``, (N,) bool or indices."""
         return replace(self, tai_ns=self.tai_ns[mask], values=self.values[mask], valid=self.valid[mask])
 
     def segments(self) -> list[slice]:
-        """Stretches of usable samples without a gap; call on ``usable``.  Cadence is that of all samples."""
+        """Stretches of samples without a gap, as slices; call on ``usable``."""
         return segments(self.tai_ns, BRIDGED, self.cadence_ns)
 
 
 @dataclass(frozen=True)
 class Telemetry:
-    """What one file (or flight) says, ready for an estimator."""
+    """Screened telemetry of one file or flight, as ``load_telemetry`` returns it.
+
+    Attributes
+    ----------
+    channels : dict of str to Channel
+        By name.
+    epoch_ns : int
+        ns TAI; times of results count from it.
+    dated : bool
+        False where the file gives no epoch: times then count from zero.
+    findings : tuple of Finding
+        What the screening found, channel by channel.
+    doubts : Doubts
+        About units and the direction of the quaternion.
+    exclusions : tuple of Exclusion
+        Spans excluded by the user.
+    inputs : tuple of Input
+        The files it was read from, with SHA-256.
+    """
 
     channels: dict[str, Channel]
     epoch_ns: int
@@ -94,47 +129,80 @@ class Telemetry:
         return name in self.channels
 
     def channel(self, name: str) -> Channel:
+        """The channel of that name.
+
+        Parameters
+        ----------
+        name : str
+            As in docs/telemetry.md.
+
+        Returns
+        -------
+        Channel
+
+        Raises
+        ------
+        BadInput
+            Where the telemetry has no such channel.
+        """
         if name not in self.channels:
             raise BadInput(
-                "this channel is needed and is not in the telemetry",
+                "this channel is required but is not in the telemetry",
                 file=self.source or None,
                 channel=name,
-                remedy=f"The telemetry holds: {some_of(self.channels)}.",
+                remedy=f"The telemetry contains: {some_of(self.channels)}.",
             )
         if self.used is not None:
             self.used.add(name)
         return self.channels[name]
 
     def watched(self) -> Telemetry:
-        """The same telemetry, which notes in ``used`` the channels that are asked for."""
+        """A copy that records in ``used`` the channels requested from it."""
         return replace(self, used=set())
 
     def found_in(self, channels) -> Doubts:
-        """What the door found in some channels, as doubts."""
+        """Findings about some channels, as doubts."""
         return found_in(self.findings, channels)
 
     def members(self, stem: str) -> list[str]:
-        """Which wheels, thrusters or mechanisms have a ``stem`` channel."""
+        """Wheels, thrusters or mechanisms that have a channel of family ``stem``: members('wheel_rate') -> ['RWA1', …]."""
         return [c.member for c in self.channels.values() if c.kind.stem == stem]
 
     def has_axes(self, stem: str) -> bool:
+        """Whether all three axes of a family are there."""
         return all(f"{stem}_{a}" in self.channels for a in AXES)
 
     @property
     def date_ns(self) -> int | None:
-        """The epoch (ns TAI), or None where the file gives no date: the craft's latest known state then holds."""
+        """The epoch (ns TAI), or None where the file gives no date; the craft's latest known state is then used."""
         return self.epoch_ns if self.dated else None
 
     @property
     def epoch_label(self) -> str:
+        """The epoch as UTC, or 'not given'."""
         return f"{utc_label(self.epoch_ns)} UTC" if self.dated else "not given"
 
     def seconds(self, tai_ns) -> np.ndarray:
-        """Seconds from the epoch."""
+        """Seconds from the epoch, of times in ns TAI."""
         return seconds_since(tai_ns, self.epoch_ns)
 
     def moment(self, text: str | float) -> int:
-        """'120' (seconds from the epoch) or a UTC stamp -> ns TAI."""
+        """A time as ns TAI.
+
+        Parameters
+        ----------
+        text : str or float
+            Seconds from the epoch (120, '120'), or UTC ('2015-09-29T00:00:00').
+
+        Returns
+        -------
+        int
+
+        Raises
+        ------
+        BadInput
+            For text that is not a time, and for UTC where the telemetry has no epoch.
+        """
         try:
             seconds = float(text)
         except ValueError:
@@ -153,19 +221,33 @@ class Telemetry:
         return ns
 
     def describe_time(self, tai_ns: int) -> str:
+        """A time for a message: seconds from the epoch, and UTC where there is one."""
         s = f"{float(self.seconds(tai_ns)):g} s"
         return f"{s} ({utc_label(tai_ns)} UTC)" if self.dated else s
 
     def span(self) -> tuple[int, int]:
-        """First and last sample of any channel."""
+        """Times of the first and last sample of any channel. [ns TAI]"""
         starts = [c.tai_ns[0] for c in self.channels.values() if len(c.tai_ns)]
         stops = [c.tai_ns[-1] for c in self.channels.values() if len(c.tai_ns)]
         return int(min(starts)), int(max(stops))
 
     def between(self, start=None, stop=None) -> Telemetry:
-        """Only the samples from ``start`` to ``stop`` (seconds from the epoch, or UTC).
+        """The telemetry of a window; the epoch stays.
 
-        The epoch stays.  Raises BadInput for a window without data or one that runs backwards."""
+        Parameters
+        ----------
+        start, stop : str or float, optional
+            Seconds from the epoch, or UTC; without one the window is open at that end.
+
+        Returns
+        -------
+        Telemetry
+
+        Raises
+        ------
+        BadInput
+            For a window without data, or one that ends before it starts.
+        """
         if start is None and stop is None:
             return self
         first, last = self.span()
@@ -200,9 +282,22 @@ class Telemetry:
         return replace(self, channels=kept)
 
     def excluding(self, exclusions: list[Exclusion]) -> Telemetry:
-        """The same telemetry with the named spans marked as not to be used.
+        """The telemetry with some spans marked as unusable.
 
-        Raises BadInput for a channel that is not there (an exclusion that excludes nothing is a slip)."""
+        Parameters
+        ----------
+        exclusions : list of Exclusion
+            Channel ('*' for all), start, stop and reason of each.
+
+        Returns
+        -------
+        Telemetry
+
+        Raises
+        ------
+        BadInput
+            For a channel that the telemetry does not have.
+        """
         channels, findings = dict(self.channels), list(self.findings)
         for x in exclusions:
             if x.channel != "*" and x.channel not in channels:

@@ -22,9 +22,9 @@ from .tables import Table, numbers_of, read_csv, times_of
 
 _FEWEST = 4
 _UNITS = {"position": "m", "velocity": "m/s"}
-#: A velocity may differ from the positions' own by this share before it is taken for one of another frame or unit.
+#: Largest relative difference of the velocities from the slope of the positions; beyond it frame or unit is wrong.
 _UNLIKE = 0.05
-#: And between two rows by this, before one of them is wrong.
+#: The same between two rows; beyond it one of them is wrong.
 _GLITCH = 0.2
 
 
@@ -40,7 +40,7 @@ class TrajectoryTable:
 
 
 def load_trajectory(path: str | Path) -> TrajectoryTable:
-    """Raises BadInput, naming file, line or column, for what is no such table or contradicts itself."""
+    """Raises BadInput, naming file, line or column, for a table of another form or one that contradicts itself."""
     try:
         return _read(Path(path))
     except BadInput as why:
@@ -64,20 +64,20 @@ def _read(path: Path) -> TrajectoryTable:
     if np.any(np.diff(tai_ns) <= 0):
         k = int(np.flatnonzero(np.diff(tai_ns) <= 0)[0])
         raise BadInput(
-            "its times do not increase", line=table.line(k + 1), remedy="Sort the rows by time, each instant once."
+            "the times do not increase", line=table.line(k + 1), remedy="Sort the rows by time, with each instant once."
         )
     r, v = columns["position"], columns["velocity"]
     chord = np.diff(r, axis=0) / (np.diff(tai_ns) / 1e9)[:, None]
     off = np.linalg.norm(chord - 0.5 * (v[1:] + v[:-1]), axis=1) / np.maximum(np.linalg.norm(chord, axis=1), 1e-12)
     if np.median(off) > _UNLIKE:
         raise BadInput(
-            f"its velocities are not those of its positions (they differ by {100 * np.median(off):.0f} %)",
-            remedy="Give both in axes fixed to the body, with their units, and rows no more than some seconds apart.",
+            f"the velocities do not match the change of the positions (they differ by {100 * np.median(off):.0f} %)",
+            remedy="Give both in axes fixed to the body, with their units, and rows at most a few seconds apart.",
         )
     if off.max() > _GLITCH:
         k = int(np.argmax(off))
         raise BadInput(
-            f"between this row and the next the craft would move at another velocity than the two say ({100 * off[k]:.0f} % off)",
+            f"the positions of this row and the next imply another velocity than the two rows give ({100 * off[k]:.0f} % off)",
             line=table.line(k),
             remedy="Correct the row, or leave it out.",
         )
@@ -90,10 +90,10 @@ def _column(table: Table, name: str, unit: str) -> np.ndarray:
         if split is not None and split[0] == name:
             rows, values, nan = numbers_of(table, j, name)
             if len(rows) < len(table) or len(nan):
-                raise BadInput("a row has no value", channel=name, remedy="Every row gives position and velocity.")
+                raise BadInput("a cell is blank", channel=name, remedy="Every row gives position and velocity.")
             return values * si_factor(split[1], unit)
     raise BadInput(
-        "this column is not in the trajectory",
+        "the trajectory has no such column",
         channel=name,
         remedy="Its header is time [s],position_x [km],position_y [km],position_z [km],velocity_x [km/s],velocity_y [km/s],velocity_z [km/s].",
     )

@@ -1,4 +1,4 @@
-"""From a store to verdicts: what it holds of one craft, limits in their units, each kind judged."""
+"""From a store to verdicts: the entries of one craft, limits in their units, a verdict on each kind."""
 
 from __future__ import annotations
 
@@ -20,12 +20,14 @@ def entries_in(store: str, craft: str | None, *, curves: bool) -> tuple[list[Ent
         if craft is not None:
             craft = Path(craft).stem if craft.endswith(".toml") else craft
         if not crafts or (craft is not None and craft not in crafts):
-            what = "is empty" if not crafts else f"holds nothing of {craft!r}"
+            what = "is empty" if not crafts else f"has no entries of {craft!r}"
             raise BadInput(f"the store {what}", file=trends,
-                           remedy=f"Crafts it holds: {some_of(crafts)}. `asflown trend add` fills it.")  # fmt: skip
+                           remedy=f"Crafts in the store: {some_of(crafts)}. `asflown trend add` adds entries.")  # fmt: skip
         if craft is None and len(crafts) > 1:
             raise BadInput(
-                f"the store holds several crafts: {some_of(crafts)}", file=trends, remedy="Choose one with --craft."
+                f"the store has entries of several crafts: {some_of(crafts)}",
+                file=trends,
+                remedy="Choose one with --craft.",
             )
         name = craft or crafts[0]
         return trends.entries(name, curves=curves), name
@@ -43,8 +45,8 @@ def healths_in(store: str, craft: str | None, limits: list[str]) -> list[Health]
     kinds = [k for k in (*MOVES, *RECORDS) if any(e.kind == k and e.values for e in entries)]
     if not kinds:
         raise BadInput(
-            f"the store holds nothing of {name} with figures of merit",
-            remedy="`asflown trend add`, and `asflown wheels`, `inertia`, `thrust` or `gates --store` fill it.",
+            f"the store has no figures of merit of {name}",
+            remedy="Add some with `asflown trend add`, or with --store of `asflown wheels`, `inertia`, `thrust` or `gates`.",
         )
     limit = limits_of(limits, entries)
     return [_judged(entries, kind, limit) for kind in kinds]
@@ -71,6 +73,6 @@ def _judged(entries: list[Entry], kind: str, limits: dict[str, float], **options
 
 
 def _cycles_allowed(entries: list[Entry]) -> int | None:
-    """Of the mechanism, as its craft said when the latest of them was analysed."""
+    """Cycles allowed to the mechanism, by the craft file with which the latest of them was analysed."""
     said = [e.provenance["cycles_allowed"] for e in entries if "cycles_allowed" in e.provenance]
     return said[-1] if said else None

@@ -1,4 +1,4 @@
-"""What is kept of one actuation: figures of merit, curves, doubts, and where they came from."""
+"""The entry of one actuation: figures of merit, curves, doubts and provenance."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import numpy as np
 
+from ..kit.doubts import Doubts
+
 #: Kinds of actuation.
 MOVES = ("deploy", "stow")
-#: Entries of other kinds, which have neither rests that matter nor cycles.
+#: Entries of other kinds, for which rests and cycles do not count.
 RECORDS = ("wheels", "inertia", "thrust", "gates")
-#: What a figure is judged by: the fused torque, or telemetry where the figure is not of the torque.
+#: Basis by which a figure is judged: the fused torque, or telemetry where the figure is not of the torque.
 BEST = ("fused", "telemetry")
 
 
@@ -57,14 +59,18 @@ class Entry:
     note: str = ""
     values: tuple[Value, ...] = ()
     curves: tuple[Curve, ...] = ()
-    doubts: tuple[str, ...] = ()
+    doubts: Doubts = Doubts()
     provenance: dict = field(default_factory=dict)
     revision: int | None = None
     added: str | None = None
 
+    def __post_init__(self):
+        if not isinstance(self.doubts, Doubts):  # sentences, as an earlier version took them
+            object.__setattr__(self, "doubts", Doubts(self.doubts))
+
     @property
     def day(self) -> float:
-        """Days since 2000-01-01 UTC, to set dates against each other."""
+        """Days since 2000-01-01 UTC, to compare dates."""
         moment = datetime.fromisoformat(self.date).replace(tzinfo=UTC)
         return (moment - datetime(2000, 1, 1, tzinfo=UTC)).total_seconds() / 86400
 
@@ -73,7 +79,7 @@ class Entry:
         return next((v for v in self.values if (v.figure, v.basis) == (figure, basis)), None)
 
     def best(self, figure: str) -> Value | None:
-        """The figure on the basis that it is judged by."""
+        """The figure on the basis by which it is judged."""
         return next((v for b in BEST if (v := self.value(figure, b)) is not None), None)
 
     @property

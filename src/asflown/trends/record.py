@@ -1,4 +1,4 @@
-"""Verdicts as plain records: what the verbs print as JSON and the report's twin holds."""
+"""Verdicts as plain records: the JSON of the verbs and of the report."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ def figure_record(f: FigureHealth) -> dict:
 
 
 def sudden_words(f: FigureHealth) -> str | None:
-    """A sentence on a sudden change, where one is seen and describes the history better than a slope."""
+    """A sentence on a sudden change, where one is found and fits the history better than a slope."""
     s = f.step
     if s is None or s.p_value >= 0.05 or s.rather_than_slope <= 0 or s.percent is None:
         return None
     return (
-        f"rather a sudden change of {s.percent:+.0f} % after {f.rows[s.before].event} than a slope "
+        f"a sudden change of {s.percent:+.0f} % after {f.rows[s.before].event} fits better than a slope "
         f"(log likelihood {s.rather_than_slope:.1f} higher; p = {s.p_value:.2g} against no change)"
     )
 
@@ -78,11 +78,13 @@ def cold_warm_record(h: Health) -> dict:
 
 
 def two_record(health: Health, first: str, second: str) -> dict:
-    """Two events' figures side by side, and how far apart their curves are.  Raises BadInput for an unknown one."""
+    """Figures of two events, their differences, and the distance between their curves.  Raises BadInput for an unknown one."""
     by_name = {e.event: e for e in health.entries}
     for name in (first, second):
         if name not in by_name:
-            raise BadInput(f"no {health.kind} called {name!r} has figures", remedy=f"There are: {some_of(by_name)}.")
+            raise BadInput(
+                f"there is no {health.kind} {name!r} with figures", remedy=f"Events with figures: {some_of(by_name)}."
+            )
     a, b = by_name[first], by_name[second]
     rows = []
     for v in a.values:
@@ -106,13 +108,13 @@ def health_record(h: Health) -> dict:
         "newest_event": h.entries[-1].event,
         "events": [
             {"event": e.event, "date": e.date, "revision": e.revision, "rest_days": h.rest_days.get(e.event),
-             "doubts": list(e.doubts), "provenance": e.provenance} for e in h.entries
+             "doubts": e.doubts.sentences(), "provenance": e.provenance} for e in h.entries
         ],
         "figures": [figure_record(f) for f in h.figures],
         "shape": shape_record(h),
         "cold_warm": cold_warm_record(h),
         "cycles": cycles_record(h),
-        "doubts": list(h.doubts),
+        **h.doubts.record(),
     }  # fmt: skip
 
 

@@ -1,18 +1,19 @@
 """Is this mechanism degrading?  Every figure's trend and newest value, cold against warm, cycles: one verdict.
 
-pass: nothing to see.  watch: a figure has a trend, may reach its limit within five years, or its newest value is
-unusual.  alarm: the newest actuation is out of line with the past ones, or a limit is passed.  Looking at many figures
-finds something in one of them by chance; p-values are adjusted for that (Holm), so that a mechanism that does not
-change raises a false alarm in at most 5 of 100 looks, and a false trend in at most 5 of 100.
+pass: no finding.  watch: a figure has a trend, may reach its limit within five years, or its newest value is
+unusual.  alarm: the newest actuation deviates from the earlier ones, or a limit is passed.  Many figures are tested
+together; p-values are adjusted for that (Holm).  A mechanism that does not change raises a false alarm in at most
+5 % of evaluations, and a false trend in at most 5 %.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
+from ..kit.doubts import Doubt, Doubts, Kind, Severity
 from ..kit.errors import BadInput, some_of
 from .entries import END_WITHIN, FIGURES
 from .entry import BEST, MOVES, Entry
@@ -45,9 +46,9 @@ from .statistics import (
     trend_of,
 )
 
-#: Adjusted p-values below which a figure is out of line, and unusual.
+#: Adjusted p-values below which a figure deviates, and is unusual.
 ALARM, WATCH = 0.05, 0.10
-#: A limit that the 95 % band may reach within so long is watched. [years]
+#: A limit that the 95 % band may reach within this time is watched. [years]
 HORIZON_YEARS = 5.0
 #: Share of the allowed cycles from which they are watched.
 _CYCLES_WATCHED = 0.8
@@ -67,7 +68,7 @@ class Row:
 
 @dataclass(frozen=True)
 class FigureHealth:
-    """One figure over the years.  ``reasons`` say why it is not simply passed."""
+    """One figure over the years.  ``reasons``: why the verdict is not pass."""
 
     figure: str
     basis: str
@@ -86,7 +87,7 @@ class FigureHealth:
 
 @dataclass(frozen=True)
 class Health:
-    """What the board is shown of one kind of actuation."""
+    """The verdict on one kind of actuation, with its evidence."""
 
     craft: str
     kind: str
@@ -102,17 +103,37 @@ class Health:
     cycles_allowed: int | None
     verdict: str
     reasons: tuple[str, ...]
-    doubts: tuple[str, ...] = field(default=())
+    doubts: Doubts = Doubts()
 
     def figure(self, name: str, basis: str | None = None) -> FigureHealth:
         """Raises BadInput where there is none of that name."""
         found = [f for f in self.figures if f.figure == name and basis in (None, f.basis)]
         if not found:
             raise BadInput(
-                f"the store holds no figure {name!r} of a {self.kind}" + (f" on the basis {basis!r}" if basis else ""),
-                remedy=f"It holds: {some_of(dict.fromkeys(f.figure for f in self.figures))}.",
+                f"the store has no figure {name!r} of kind {self.kind}" + (f" on the basis {basis!r}" if basis else ""),
+                remedy=f"Its figures: {some_of(dict.fromkeys(f.figure for f in self.figures))}.",
             )
         return found[0]
+
+
+TOO_FEW = Kind(
+    "trends.too-few",
+    Severity.CAUTION,
+    "there are too few events ({events}) for the interval of a trend, which needs {needed}",
+)
+STEP_OR_SLOPE = Kind(
+    "trends.step-or-slope",
+    Severity.CAUTION,
+    "{events} events hardly distinguish a sudden change from a slow one",
+)
+NEWEST_NOT_JUDGED = Kind(
+    "trends.newest-not-judged", Severity.CAUTION, "the newest event is not judged: this needs {needed} earlier events"
+)
+NO_PAIR = Kind(
+    "trends.no-pair", Severity.NOTE,
+    "there is no cold and warm pair: no event after {cold_days:g} days of rest is followed by another within {warm_days:g} days",
+)  # fmt: skip
+IN_EVENT = Kind("trends.in-event", Severity.SUSPECT, "{event}: {sentence}")
 
 
 def judge(
@@ -127,26 +148,26 @@ def judge(
     """Judge all actuations of one kind of one craft; ``entries`` of other kinds count for rests and cycles.
 
     ``limits``: largest (or, where negative or below the values, smallest) allowed values in SI by figure.
-    ``until``: take this event as the newest, later ones away.  Raises BadInput where there is nothing to judge."""
+    ``until``: take this event as the newest and ignore later ones.  Raises BadInput where there is nothing to judge."""
     entries = sorted(entries, key=lambda e: (e.day, e.event))
     if until is not None:
         last = next((e.day for e in entries if e.event == until), None)
         if last is None:
             raise BadInput(
-                f"the store holds no event {until!r}", remedy=f"It holds: {some_of(e.event for e in entries)}."
+                f"the store has no event {until!r}", remedy=f"Its events: {some_of(e.event for e in entries)}."
             )
         entries = [e for e in entries if e.day <= last]
     of_kind = [e for e in entries if e.kind == kind and e.values]
     if not of_kind:
         kinds = some_of(sorted({e.kind for e in entries if e.values}))
-        raise BadInput(f"the store holds no {kind} with figures of merit", remedy=f"Kinds it holds: {kinds}.")
+        raise BadInput(f"the store has no figures of merit of kind {kind}", remedy=f"Its kinds: {kinds}.")
     limits = limits or {}
     figures = [_figure(of_kind, name, basis) for name, basis in _figures_of(of_kind)]
     family = [k for k, f in enumerate(figures) if _judged(f)]
     shape = _shape(of_kind)
     trended = {k: t.p_value for k in family if (t := figures[k].trend) is not None and len(figures[k].rows) >= FEWEST}
     adjusted = dict(zip(trended, holm(list(trended.values())), strict=True))
-    # the newest must be the newest event's own: a figure that it lacks says nothing of it
+    # the newest value must be of the newest event itself
     fresh: dict[int | str, float] = {
         k: n.p_value
         for k in family
@@ -160,7 +181,7 @@ def judge(
         for k, f in enumerate(figures)
     ]
     shape_p = fresh.get(SHAPE)
-    pairs = find_pairs(entries, kind) if kind in MOVES else []  # a wheel or a tensor does not rest
+    pairs = find_pairs(entries, kind) if kind in MOVES else []  # rests do not apply to a wheel or a tensor
     same = [
         e for k in family
         if (t := figures[k].trend) is not None and (e := equivalence(figures[k].figure, pairs, t, margin)) is not None
@@ -172,12 +193,12 @@ def judge(
     return Health(
         of_kind[-1].craft, kind, tuple(of_kind), tuple(figures), shape, shape_p, tuple(pairs), tuple(same),
         curve_distances(of_kind, pairs, kind), rests(entries), used, cycles_allowed, ORDER[worst],
-        tuple(r for v, r in sorted(verdicts, key=lambda x: -ORDER.index(x[0]))), tuple(_doubts(of_kind, figures, pairs)),
+        tuple(r for v, r in sorted(verdicts, key=lambda x: -ORDER.index(x[0]))), _doubts(of_kind, pairs),
     )  # fmt: skip
 
 
 def values_of(entries: list[Entry], figure: str, basis: str) -> tuple[list[Entry], Values]:
-    """Entries that hold a figure, and its values.  Nine digits are kept: what differs further down is rounding."""
+    """Entries that hold a figure, and its values.  Nine digits are kept; differences beyond them are rounding."""
     held = [(e, v) for e in entries if (v := e.value(figure, basis)) is not None and v.value is not None]
     value = np.array([float(f"{v.value:.9g}") for _, v in held])
     sigma = np.array([v.sigma or 0.0 for _, v in held])
@@ -231,32 +252,32 @@ def _judge_figure(f: FigureHealth, trend_p, newest_p, limit) -> FigureHealth:
     n = f.newest
     if n is not None and newest_p is not None and newest_p < WATCH:
         off = f" ({100 * (n.value / n.expected - 1):+.1f} %)" if n.expected else ""
-        how = "out of line with" if newest_p < ALARM else "unusual beside"
+        how = "deviates from" if newest_p < ALARM else "is unusual among"
         said.append((
             "alarm" if newest_p < ALARM else "watch",
-            f"{name} of {f.rows[-1].event} is {how} the past: {n.value:.3g} {f.unit} where {n.expected:.3g} was to be "
-            f"expected{off}, p = {newest_p:.2g} for all figures together",
+            f"{name} of {f.rows[-1].event} {how} the earlier events: {n.value:.3g} {f.unit}, "
+            f"{n.expected:.3g} expected{off}, p = {newest_p:.2g} over all figures",
         ))  # fmt: skip
     t = f.trend
     if t is not None and trend_p is not None and trend_p < ALARM:
         span = (t.values.day[-1] - t.values.day[0]) / YEAR
         if t.change_percent is not None and t.change_percent_ci95 is not None:
             low, high = t.change_percent_ci95
-            word = "grown" if t.change_percent > 0 else "fallen"
+            word = "increased" if t.change_percent > 0 else "decreased"
             said.append(("watch", f"{name} has {word} by {abs(t.change_percent):.0f} % in {span:.1f} years "
-                                  f"(95 %: {low:+.0f} to {high:+.0f} %), p = {trend_p:.2g} for all figures together"))  # fmt: skip
+                                  f"(95 %: {low:+.0f} to {high:+.0f} %), p = {trend_p:.2g} over all figures"))  # fmt: skip
         else:
             said.append(
                 (
                     "watch",
-                    f"{name} changes by {t.slope_per_year:+.2g} {f.unit} a year, p = {trend_p:.2g} for all figures together",
+                    f"{name} changes by {t.slope_per_year:+.2g} {f.unit} a year, p = {trend_p:.2g} over all figures",
                 )
             )
     if limit is not None and f.trend is not None:
         now = f.rows[-1].value
-        rising = limit >= f.rows[0].value  # a limit lies beyond where the history began
+        rising = limit >= f.rows[0].value  # a limit lies beyond the start of the history
         if (now >= limit) if rising else (now <= limit):
-            said.append(("alarm", f"{name} is past its limit: {now:.3g} against {limit:.3g} {f.unit}"))
+            said.append(("alarm", f"{name} exceeds its limit: {now:.3g} {f.unit}, limit {limit:.3g}"))
         elif len(f.rows) >= FEWEST:
             reached = f.trend.crossing(limit)
             if reached[0] is not None and reached[0] - f.trend.values.day[-1] <= HORIZON_YEARS * YEAR:
@@ -274,12 +295,12 @@ def _judge_figure(f: FigureHealth, trend_p, newest_p, limit) -> FigureHealth:
 def _shape_verdict(p: float | None) -> list[tuple[str, str]]:
     if p is None or p >= WATCH:
         return []
-    how = "out of line with" if p < ALARM else "unusual beside"
-    return [("alarm" if p < ALARM else "watch", f"the {SHAPE} is {how} the past ones', p = {p:.2g}")]
+    how = "deviates from" if p < ALARM else "is unusual among"
+    return [("alarm" if p < ALARM else "watch", f"the {SHAPE} {how} that of the earlier events, p = {p:.2g}")]
 
 
 def _end_verdict(entries: list[Entry]) -> list[tuple[str, str]]:
-    """Whether the newest arrived: its switch, and its angle beside the usual one."""
+    """Whether the newest reached its end position: its switch, and its angle compared with the usual one."""
     newest = entries[-1]
     switch = newest.value("microswitch", "telemetry")
     found = []
@@ -289,7 +310,7 @@ def _end_verdict(entries: list[Entry]) -> list[tuple[str, str]]:
     if len(angles) > 1 and newest.value("end_angle", "telemetry") is not None:
         off = angles[-1] - float(np.median(angles[:-1]))
         if abs(off) > END_WITHIN:
-            found.append(("alarm", f"{newest.event} ends {np.degrees(off):+.2f} deg from where the others did"))
+            found.append(("alarm", f"{newest.event} ends {np.degrees(off):+.2f} deg from the end angle of the others"))
     return found
 
 
@@ -300,19 +321,17 @@ def _cycle_verdict(used: float, allowed: int | None) -> list[tuple[str, str]]:
     return [(level, f"{used:g} of {allowed} allowed cycles are used")]
 
 
-def _doubts(entries: list[Entry], figures: list[FigureHealth], pairs: list[Pair]) -> list[str]:
-    said = []
+def _doubts(entries: list[Entry], pairs: list[Pair]) -> Doubts:
+    found: list[Doubt] = []
     n = len(entries)
     if n < FEWEST:
-        said.append(f"{n} event{'s are' if n > 1 else ' is'} too few for a trend's interval: it takes {FEWEST}")
+        found.append(TOO_FEW(events=n, needed=FEWEST))
     elif n <= FEW:
-        said.append(f"with {n} events a sudden change and a slow one are told apart badly")
+        found.append(STEP_OR_SLOPE(events=n))
     if n <= FEWEST_PAST:
-        said.append(f"the newest event is not judged: that takes {FEWEST_PAST} before it")
+        found.append(NEWEST_NOT_JUDGED(needed=FEWEST_PAST))
     if not pairs and entries[-1].kind in MOVES:
-        said.append(
-            f"no cold and warm pair: none comes after {COLD_DAYS:g} days of rest with another within {WARM_DAYS:g} days of its own last actuation"
-        )
+        found.append(NO_PAIR(cold_days=COLD_DAYS, warm_days=WARM_DAYS))
     for e in entries:
-        said += [f"{e.event}: {d}" for d in e.doubts if "should be zero" in d or "does not explain" in d]
-    return said
+        found += [IN_EVENT(event=e.event, sentence=str(d), of=d.kind.id) for d in e.doubts if d.is_grave]
+    return Doubts(found)

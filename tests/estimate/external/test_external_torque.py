@@ -125,7 +125,7 @@ def test_property_a_hold_without_noise_gives_its_torque(torque, turn):
 
 
 def test_law_both_methods_agree_in_a_hold():
-    f = fly("quiet", craft=CASSINI, duration="3600 s", epoch="2005-02-09T00:00:00", seed=3)
+    f = fly("quiet", craft=CASSINI, seed=3, changes={"duration": "3600 s", "epoch": "2005-02-09T00:00:00"})
     drift, momentum = (external_torque(f.telemetry, CASSINI, method=m) for m in ("drift", "momentum"))
     assert drift.torque_Nm == pytest.approx(momentum.torque_Nm, abs=0.02 * momentum.torque_sigma_Nm.min())
     assert drift.torque_sigma_Nm == pytest.approx(momentum.torque_sigma_Nm, rel=1e-3)
@@ -154,7 +154,9 @@ def flown_pulls(scenario: str, seeds, **changes):
     for seed in seeds:
         T = np.random.default_rng(7000 + seed).uniform(-4e-6, 4e-6, 3)
         torques = [{"shape": "constant", "torque": " ".join(map(str, T)) + " N m"}]
-        f = fly(scenario, craft=CASSINI, seed=seed, torques=torques, epoch="2005-02-09T00:00:00", **changes)
+        f = fly(
+            scenario, craft=CASSINI, seed=seed, changes={"torques": torques, "epoch": "2005-02-09T00:00:00", **changes}
+        )
         r = external_torque(f.telemetry, CASSINI)
         pulls.append((r.torque_Nm - T) / r.torque_sigma_Nm)
         within.append((r.torque_ci95_Nm[:, 0] < T) & (r.torque_ci95_Nm[:, 1] > T))
@@ -200,11 +202,24 @@ def test_recovery_of_a_quiet_day():
     """A whole day in the loop, slowly turning: 0.01 to 0.02 uN m, and the printed method is off by what w x H is."""
     w = 2e-8
     f = fly(
-        "quiet", craft=CASSINI, epoch="2005-02-09T00:00:00", duration="86400 s",
-        torques=[{"shape": "constant", "torque": " ".join(map(str, TOTAL)) + " N m"}],
-        slews=[{"start": "0 s", "axis": "1 0 0", "angle": f"{w * 86402} rad", "rate": f"{w} rad/s", "acceleration": "1e-6 rad/s2"}],
-        telemetry={"wheel_rate": "60 s", "body_rate": "60 s", "attitude_error": "0 s", "quaternion": "60 s"},
-    )  # fmt: skip
+        "quiet",
+        craft=CASSINI,
+        changes={
+            "epoch": "2005-02-09T00:00:00",
+            "duration": "86400 s",
+            "torques": [{"shape": "constant", "torque": " ".join(map(str, TOTAL)) + " N m"}],
+            "slews": [
+                {
+                    "start": "0 s",
+                    "axis": "1 0 0",
+                    "angle": f"{w * 86402} rad",
+                    "rate": f"{w} rad/s",
+                    "acceleration": "1e-6 rad/s2",
+                }
+            ],
+            "telemetry": {"wheel_rate": "60 s", "body_rate": "60 s", "attitude_error": "0 s", "quaternion": "60 s"},
+        },
+    )
     r = external_torque(f.telemetry, CASSINI)
     assert np.abs((r.torque_Nm - TOTAL) / r.torque_sigma_Nm).max() < 3.5 and r.torque_sigma_Nm.max() < 0.02e-6
     gyroscopic = np.cross([w, 0, 0], f.truth.wheel_momentum_Nms.mean(axis=0))
@@ -225,7 +240,7 @@ def test_flights_of_another_simulator():
 
 
 def test_a_wrong_inertia_shows_in_what_is_left():
-    f = fly("slews", craft=CASSINI, seed=1, epoch="2005-02-09T00:00:00")
+    f = fly("slews", craft=CASSINI, seed=1, changes={"epoch": "2005-02-09T00:00:00"})
     wrong = load_craft("cassini", inertia=(6510, 5333, 3519, -124.8, -38.7, 133.0))
     r = external_torque(f.telemetry, wrong)
     assert r.doubts.has(doubt.OUTLIERS, doubt.FEW_EFFECTIVE_SAMPLES)
@@ -248,9 +263,18 @@ def test_inspiresat1_is_relative_and_says_that_its_torque_is_not_constant():
 
 
 def test_gaps_outliers_and_channels_at_other_instants():
-    f = fly("slews", craft=CASSINI, seed=4, epoch="2005-02-09T00:00:00", telemetry={
-        "random_phases": True, "gaps": [{"channel": "wheel_rate", "start": "600 s", "stop": "700 s"}]
-    })  # fmt: skip
+    f = fly(
+        "slews",
+        craft=CASSINI,
+        seed=4,
+        changes={
+            "epoch": "2005-02-09T00:00:00",
+            "telemetry": {
+                "random_phases": True,
+                "gaps": [{"channel": "wheel_rate", "start": "600 s", "stop": "700 s"}],
+            },
+        },
+    )
     r = external_torque(f.telemetry, CASSINI)
     assert r.doubts.has(SPLINED) and r.doubts.has(GAPS_IN_MOMENTUM)
     assert (np.abs(r.torque_Nm) < 4 * r.torque_sigma_Nm).all()
@@ -285,7 +309,7 @@ def test_stored_momentum_stands_in_for_wheel_rates():
 
 
 def test_what_it_refuses():
-    hold, slewing = held(TOTAL), fly("slews", craft=CASSINI, duration="600 s").telemetry
+    hold, slewing = held(TOTAL), fly("slews", craft=CASSINI, changes={"duration": "600 s"}).telemetry
     t = hold.seconds(hold.channel("wheel_rate_RWA1").tai_ns)
     fired = with_channels(hold, *telemetry(t, {"on_time_Z1": np.floor(t / 3e4)}).channels.values())
     with pytest.raises(BadInput, match=r"thrusters fire .*Z1.*\n.*--start"):

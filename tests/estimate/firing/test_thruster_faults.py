@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 
 from asflown.craft.load import load_craft
+from asflown.estimate.firing.counters import COUNTER_FALLS
+from asflown.estimate.firing.firings import BRANCH_NOT_DESCRIBED
 from asflown.estimate.firing.priors import priors_for
+from asflown.estimate.leak.doubts import BRANCH_CHANGES, LOSS_TOO_LARGE, OTHER_BRANCH, UNCOUNTED_PULSES
 from asflown.estimate.leak.watch import leak
+from asflown.estimate.subject.wheel_limits import AT_LIMIT, STANDS_STILL
+from asflown.estimate.thrust.doubts import OFF_PREDICTION
 from asflown.estimate.thrust.methods import thrust
 from asflown.kit.errors import BadInput
 from asflown.sim.flight.closed_loop import fly
@@ -23,10 +28,6 @@ FULL = [{"start": "330 s", "stop": "450 s", "rates": {"RWA1": "-2300 rpm", "RWA2
 
 def clipped(tlm: Telemetry, wheel: str, rate: float) -> Telemetry:
     return changed(tlm, f"wheel_rate_{wheel}", lambda c: replace(c, values=np.clip(c.values, -rate, rate)))
-
-
-def said(result, *words: str) -> bool:
-    return any(all(w in d for w in words) for d in result.doubts)
 
 
 @pytest.fixture
@@ -51,7 +52,9 @@ def swapped():
 def full():
     """A wheel of a craft without limits goes where the craft file says that none does."""
     endless = tuple(w.model_copy(update={"rate_limit": None}) for w in CASSINI.wheels)
-    return fly(EVENT, seed=SEED, craft=CASSINI.model_copy(update={"wheels": endless}), wheel_biases=FULL).telemetry
+    return fly(
+        EVENT, seed=SEED, craft=CASSINI.model_copy(update={"wheels": endless}), changes={"wheel_biases": FULL}
+    ).telemetry
 
 
 # ---- the other branch ---------------------------------------------------------------------------------------
@@ -59,8 +62,8 @@ def full():
 
 def test_the_sound_event_has_no_fault(sound):
     result = thrust(sound, CASSINI)
-    assert abs(result.mean_thrust_N - 0.699) < 2.5 * result.mean_sigma_N
-    assert not said(result, "branch") and not said(result, "rate limit")
+    assert abs(result.mean_thrust_N - 0.699) < 2.5 * result.mean_thrust_sigma_N
+    assert not result.doubts.has(BRANCH_NOT_DESCRIBED, OFF_PREDICTION, AT_LIMIT)
     assert not leak(sound, CASSINI, thrust_N=0.699).alarm
 
 
@@ -78,11 +81,13 @@ def test_branch_that_fires_uncounted_is_refused_by_thrust(uncounted, swapped, me
 def test_branch_that_fires_uncounted_is_told_by_leak(uncounted, swapped):
     for tlm in (without(uncounted, "thruster_branch"), without(swapped, "thruster_branch")):
         result = leak(tlm, CASSINI, thrust_N=0.699)
-        assert result.alarm and said(result, "together would", "other branch", "Y1", "Y3")
+        assert result.alarm and result.doubts.has(UNCOUNTED_PULSES)
         assert result.alternative == f"{result.thruster} of branch B"
         assert {"Y1", "Y3"} <= set(result.together) and "momentum as of several thrusters" in str(result)
-    assert said(leak(swapped, CASSINI, thrust_N=0.699), "branch changes from A to B by 400 s")
-    assert said(leak(uncounted, CASSINI, thrust_N=0.699), "branch B is in use", "describes branch A")
+    (changes,) = leak(swapped, CASSINI, thrust_N=0.699).doubts.of(BRANCH_CHANGES)
+    assert "from A to B by 400 s" in changes.about["change"]
+    (other,) = leak(uncounted, CASSINI, thrust_N=0.699).doubts.of(OTHER_BRANCH)
+    assert other.about["branches"] == "branch B is in use and the craft file describes branch A"
 
 
 def test_branch_too_short_for_its_noise_is_told_by_leak(uncounted):
@@ -92,10 +97,10 @@ def test_branch_too_short_for_its_noise_is_told_by_leak(uncounted):
 
 def test_branch_under_the_others_names_shows_in_the_thrust():
     """Places are the same: only a thrust unlike the one predicted tells, and the channel."""
-    other = fly(EVENT, seed=SEED, thrusters={"branch": "B", "thrust": "0.59 N"}).telemetry
-    assert said(thrust(other, CASSINI), "branch B is in use", "the thrust is that of branch B")
+    other = fly(EVENT, seed=SEED, changes={"thrusters": {"branch": "B", "thrust": "0.59 N"}}).telemetry
+    assert thrust(other, CASSINI).doubts.of(BRANCH_NOT_DESCRIBED).about(branch="B")
     unlabelled = thrust(without(other, "thruster_branch"), CASSINI)
-    assert said(unlabelled, "% from the", "predicted", "other branch")
+    assert unlabelled.doubts.has(OFF_PREDICTION)
     assert not leak(without(other, "thruster_branch"), CASSINI, thrust_N=0.699).alarm  # 16 % within 10 % of one sigma
 
 
@@ -108,7 +113,7 @@ def test_names_exchanged_two_and_two_are_refused(sound):
 def test_the_alternative_is_always_named():
     """A thruster of the other branch sits in the same place: named for a leak, a weak one, and by the papers' monitor."""
     fault = [{"thruster": "Y4", "start": "600 s", "leak": "30 mN"}]
-    tlm = fly("leak", seed=1, duration="660 s", thruster_faults=fault).telemetry
+    tlm = fly("leak", seed=1, changes={"duration": "660 s", "thruster_faults": fault}).telemetry
     craft = load_craft("cassini", cm=(0, 0, 1.35))
     for method in ("likelihood", "threshold"):
         assert leak(tlm, craft, method=method).alternative == "Y4 of branch B"
@@ -127,20 +132,23 @@ def test_the_alternative_is_always_named():
 
 def test_wheel_that_saturates_is_told_and_left_out():
     """The wheel stops at its limit and thrusters hold the attitude on: nothing is missing but what the reading might hide."""
-    flight = fly(EVENT, seed=SEED, wheel_biases=FULL, thruster_control=[{"start": "300 s", "stop": "900 s"}])
+    flight = fly(
+        EVENT, seed=SEED, changes={"wheel_biases": FULL, "thruster_control": [{"start": "300 s", "stop": "900 s"}]}
+    )
     assert flight.truth.wheel_rate_rad_s[-1, 0] == pytest.approx(-2020 * RPM, rel=2e-3)
     result = thrust(flight.telemetry, CASSINI)
-    assert said(result, "RWA1 is at its rate limit from 436 s")
-    assert abs(result.mean_thrust_N - 0.699) < 2.5 * result.mean_sigma_N
+    (limit,) = result.doubts.of(AT_LIMIT)
+    assert limit.about["wheel"] == "RWA1" and "436 s" in limit.about["first"]
+    assert abs(result.mean_thrust_N - 0.699) < 2.5 * result.mean_thrust_sigma_N
     found = leak(flight.telemetry, CASSINI, thrust_N=0.699)
-    assert not found.alarm and said(found, "RWA1 is at its rate limit")
+    assert not found.alarm and found.doubts.of(AT_LIMIT).about(wheel="RWA1")
 
 
 def test_reading_that_stops_at_the_limit_does_not_count(full):
     tlm = clipped(full, "RWA1", 2020 * RPM)
     joint = thrust(tlm, CASSINI)
-    assert said(joint, "RWA1 is at its rate limit")
-    assert abs(joint.mean_thrust_N - 0.699) < 2.5 * joint.mean_sigma_N
+    assert joint.doubts.of(AT_LIMIT).about(wheel="RWA1")
+    assert abs(joint.mean_thrust_N - 0.699) < 2.5 * joint.mean_thrust_sigma_N
     forty = priors_for(CASSINI, fall_s=0.040)
     assert thrust(tlm, CASSINI, method="printed", priors=forty).mean_thrust_N == pytest.approx(0.699, rel=0.04)
     assert not leak(tlm, CASSINI, thrust_N=0.699).alarm
@@ -152,10 +160,11 @@ def test_reading_that_stops_at_the_limit_does_not_count(full):
 
 def test_reading_that_stops_below_the_limit_is_suspected(sound):
     tlm = clipped(sound, "RWA1", 600 * RPM)
-    assert said(thrust(tlm, CASSINI), "RWA1 stands still at its largest, 600 rpm", "saturation")
+    (still,) = thrust(tlm, CASSINI).doubts.of(STANDS_STILL)
+    assert still.about["wheel"] == "RWA1" and still.numbers["largest_rpm"] == pytest.approx(600)
     found = leak(tlm, CASSINI, thrust_N=0.699)
-    assert found.alarm and said(found, "RWA1 stands still", "saturation")
-    assert said(found, "more than a thruster has to lose") or found.kind == "leak"
+    assert found.alarm and found.doubts.of(STANDS_STILL).about(wheel="RWA1")
+    assert found.doubts.has(LOSS_TOO_LARGE) or found.kind == "leak"
 
 
 # ---- counters -----------------------------------------------------------------------------------------------
@@ -194,13 +203,15 @@ def test_declared_wraps_are_taken_up(sound, tmp_path):
     plain = thrust(sound, CASSINI)
     assert found[True].on_time_s == plain.on_time_s and found[True].pulses == plain.pulses
     assert found[True].mean_thrust_N == pytest.approx(plain.mean_thrust_N, rel=1e-6)
-    assert not said(found[True], "falls at")
-    assert said(found[False], "falls at", "declare a wrap")
+    assert not found[True].doubts.has(COUNTER_FALLS)
+    assert found[False].doubts.has(COUNTER_FALLS)
 
 
 def test_slews_on_wheels_are_not_taken_for_firing():
     """Nothing fires and wheels turn the craft, with an inertia 5 % off: no thruster fires, that is all."""
-    flight = fly("slews-axes", duration="900 s", thrusters={"control": False, "center_of_mass": "0 0 1.35 m"})
+    flight = fly(
+        "slews-axes", changes={"duration": "900 s", "thrusters": {"control": False, "center_of_mass": "0 0 1.35 m"}}
+    )
     larger = tuple(1.05 * v for v in (6510, 5333, 3519, -124.8, -38.7, 133.0))
     for tlm in (flight.telemetry, without(flight.telemetry, "body_rate")):
         with pytest.raises(BadInput, match="no thruster fires"):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from asflown.estimate.fused.body import AxisData
 from asflown.estimate.fused.free_body import FreeBody, FreeLevels
 from asflown.estimate.fused.held_back import APART, between_ends, blocks, hold_back, predict
 from asflown.estimate.fused.series import BODY_RATE, CONTROL_TORQUE, MOMENTUM, Series, arrange
@@ -79,15 +80,14 @@ def test_law_a_scale_that_is_not_learnt_widens_the_band_and_leaves_the_mean():
     """2 % of a commanded torque: the mean stays, and the band's variance gains that of 2 % of the torque's answer."""
     momentum = drawn(2)[1].values
     series = [drawn(2)[0], Series(CONTROL_TORQUE, SECONDS, -np.gradient(momentum))]
-    times, data = arrange(series)
-    none = np.empty((len(data.row), 0))
-    post = gaussian_torque(BODY, LEVELS, times, data, none, 2000, np.random.default_rng(0))
-    model = BODY.smooth_model(LEVELS, times)
+    axis = AxisData.of(BODY, LEVELS, series)
+    times, data, model = axis.times, axis.data, axis.model
+    post = gaussian_torque(axis, 2000, np.random.default_rng(0))
     best = smooth(model, data).mean
     steps = np.repeat(np.arange(len(times.seconds)), np.diff(data.start))
     pushed = best[steps] @ model.H[CONTROL_TORQUE]
     column = 0.02 * np.where(data.row == CONTROL_TORQUE, pushed, 0.0)[:, None]
-    wide = widened(post, BODY, LEVELS, times, data, column, np.random.default_rng(1))
+    wide = widened(post, replace(axis, columns=column), np.random.default_rng(1))
     assert np.array_equal(wide.mean, post.mean) and wide.considered.std() == pytest.approx(1, abs=0.1)
     moved = smooth(model, replace(data, value=column[:, 0])).mean[:, BODY.torque] * BODY.inertia_kgm2
     assert wide.paths.var(axis=0) == pytest.approx(post.paths.var(axis=0) + moved**2, rel=0.25)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from asflown import disturbance_torque, fly
+import asflown
+from asflown import fly
 from asflown.estimate.fused.peaks import PEAK_REACH_S, excursions, peak_scale
 from asflown.sim.scenario.scenario import load_scenario
 from flights import CASSINI, flown
@@ -40,21 +41,21 @@ def test_law_what_stands_out_less_than_a_quarter_is_no_excursion():
 
 
 def test_recovery_sigma_and_interval_of_a_peak_are_those_of_its_draws_times_the_scale():
-    r = disturbance_torque(flown("cover-deploy", seed=3).telemetry, CASSINI, axis="y", method="fused")
+    r = asflown.torque(flown("cover-deploy", seed=3).telemetry, CASSINI, axis="y", method="fused")
     scale = r.settings["torque"]["y"]["peak_scale"]
     assert 1 <= scale < 3 and scale == r.peak_scale("y") and r.peak_scale("x") == 1.0
     at_s, true = LARGE[0]
     p = r.peak(at_s, PEAK_REACH_S, "y")
     near = np.abs(r.paths_time_s - at_s) <= PEAK_REACH_S
     highest = r.paths_Nm[:, near, 1].max(axis=1)
-    assert p.torque_Nm == pytest.approx(highest.mean()) and abs(p.torque_Nm - true) < 3 * p.sigma_Nm
-    assert 0.6 < p.sigma_Nm / (scale * highest.std()) < 1.4
-    assert np.ptp(p.interval_95_Nm) == pytest.approx(scale * np.ptp(np.quantile(highest, [0.025, 0.975])))
+    assert p.torque_Nm == pytest.approx(highest.mean()) and abs(p.torque_Nm - true) < 3 * p.torque_sigma_Nm
+    assert 0.6 < p.torque_sigma_Nm / (scale * highest.std()) < 1.4
+    assert np.ptp(p.torque_ci95_Nm) == pytest.approx(scale * np.ptp(np.quantile(highest, [0.025, 0.975])))
     assert p.holds(p.torque_Nm) and not p.holds(2 * p.torque_Nm)
 
 
 def test_law_pure_lines_are_not_flown_again():
-    r = disturbance_torque(flown("profile-2", seed=3).telemetry, CASSINI, axis="y", method="fused")
+    r = asflown.torque(flown("profile-2", seed=3).telemetry, CASSINI, axis="y", method="fused")
     assert r.settings["torque"]["y"]["lines_probability"] > 0.5 and "peak_scale" not in r.settings["torque"]["y"]
     assert r.peak_scale("y") == 1.0
 
@@ -66,7 +67,7 @@ def test_recovery_intervals_of_a_curves_narrow_peaks_hold(noise):
     plan, held = load_scenario("cover-deploy"), []
     for seed in range(1000, 1008):
         flight = fly(plan, seed=seed, noise=noise)
-        r = disturbance_torque(flight.telemetry, CASSINI, axis="y", method="fused")
+        r = asflown.torque(flight.telemetry, CASSINI, axis="y", method="fused")
         held += [r.peak(at_s, PEAK_REACH_S, "y").holds(true) for at_s, true in LARGE]
     assert np.mean(held) > 0.85
 

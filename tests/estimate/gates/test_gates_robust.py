@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from asflown.estimate.gates.fit import fit_gates, problems
+from asflown.estimate.gates import gates
+from asflown.estimate.gates.fit_doubts import DOWN_WEIGHTED, HEAVY_TAILS
+from asflown.estimate.gates.likelihoods import problems
 from asflown.estimate.gates.robust import FREEDOM, scale_of
 from asflown.maneuvers.history import past_model
 from asflown.sim.maneuver_sets import MAIN_ENGINE_SET, execute
@@ -72,15 +74,15 @@ def test_a_burn_far_out_counts_little_and_is_named():
     error = m.magnitude_error_mps.copy()
     error[20] += 60e-3
     soil = replace(m, magnitude_error_mps=error)
-    fit, clean = fit_gates(soil, likelihood="robust"), fit_gates(m, likelihood="robust")
+    fit, clean = gates(soil, likelihood="robust"), gates(m, likelihood="robust")
     assert fit.magnitude.point.fixed < 1.25 * clean.magnitude.point.fixed
-    assert fit_gates(soil).magnitude.point.fixed > 2 * clean.magnitude.point.fixed
+    assert gates(soil).magnitude.point.fixed > 2 * clean.magnitude.point.fixed
     worst = min(fit.record()["down_weighted"], key=lambda d: d["weight"])
     assert (worst["id"], worst["part"]) == (m.id[20], "magnitude") and worst["weight"] < 0.05
-    assert any("4 degrees of freedom" in d and m.id[20] in d for d in fit.doubts)
+    assert [d.numbers["freedom"] for d in fit.doubts.of(HEAVY_TAILS)] == [4]
+    assert m.id[20] in fit.doubts.of(DOWN_WEIGHTED)[0].about["burns"].split(", ")
     assert (
-        fit.magnitude.record()["log_likelihood_printed_normaliser"] is None
-        and fit_gates(m).record()["down_weighted"] == []
+        fit.magnitude.record()["log_likelihood_printed_normaliser"] is None and gates(m).record()["down_weighted"] == []
     )
 
 

@@ -9,7 +9,7 @@ from scipy import stats
 
 from asflown.estimate.gates.foreseen import Foreseen
 from asflown.estimate.gates.power import alarm_chance, detectable
-from asflown.estimate.gates.watch import cusum_limit, watch_maneuvers
+from asflown.estimate.gates.watch import JUDGED_BY_MODEL, Alarm, cusum_limit, gates_watch
 from asflown.kit.errors import BadInput
 from asflown.maneuvers.history import past_model
 from asflown.sim.maneuver_sets import A_BRANCH_END, MAIN_ENGINE_SET, RCS_SET, a_branch, execute
@@ -24,7 +24,7 @@ RCS = past_model("rcs/2008-01")
 
 def test_recovery_the_a_branch_story():
     """Thrusters 6 % weak: alarm at OTM-160 or 169, OTM-166 too small to show it, and the last burns stand out to the papers' rule."""
-    w = watch_maneuvers(a_branch(RCS.model, 0.06, 1))
+    w = gates_watch(a_branch(RCS.model, 0.06, 1))
     by = {b.id: b for b in w.burns}
     assert w.verdict == "alarm" and w.first_alarm in ("OTM-160", "OTM-169")
     assert (
@@ -104,45 +104,45 @@ def test_law_the_cumulated_sums_limit_is_passed_as_often_as_asked():
 
 
 def test_law_detectable_is_where_the_power_is_eight_in_ten():
-    w = watch_maneuvers(a_branch(RCS.model, 0.0, 4))
+    w = gates_watch(a_branch(RCS.model, 0.0, 4))
     for b in w.burns[::5]:
         assert alarm_chance(b.foreseen, detectable(b.foreseen, w.limit_p), w.limit_p) == pytest.approx(0.8, abs=1e-3)
 
 
 def test_a_burn_that_alarms_does_not_enter_the_model():
     m = a_branch(RCS.model, 0.15, 2)
-    w = watch_maneuvers(m)
+    w = gates_watch(m)
     by = {b.id: b for b in w.burns}
     assert by["OTM-160"].alarms and by["OTM-169"].alarms
-    clean = watch_maneuvers(m.without(["OTM-160"], "test"), first="OTM-169")
+    clean = gates_watch(m.without(["OTM-160"], "test"), first="OTM-169")
     assert by["OTM-169"].z == pytest.approx(clean.burns[0].z, rel=1e-6)
 
 
 def test_pointing_raises_its_own_alarm():
     m = execute(RCS.model, RCS_SET, 6)
     m.pointing_error_mps[40] += 20e-3
-    w = watch_maneuvers(m)
+    w = gates_watch(m)
     alarmed = [b for b in w.burns if b.alarms]
-    assert [b.id for b in alarmed] == [m.id[40]] and alarmed[0].alarms == ("pointing",)
+    assert [b.id for b in alarmed] == [m.id[40]] and alarmed[0].alarms == (Alarm.POINTING,)
 
 
 def test_a_model_of_the_history_judges_from_the_first_burn():
     m = execute(past_model("main/2012-1").left, MAIN_ENGINE_SET, 3)
-    w = watch_maneuvers(m, against=past_model("main/2012-1"))
-    assert len(w.burns) == 48 and w.against == "main-engine/2012-1" and any("judged by" in d for d in w.doubts)
+    w = gates_watch(m, against=past_model("main/2012-1"))
+    assert len(w.burns) == 48 and w.against == "main-engine/2012-1" and w.doubts.has(JUDGED_BY_MODEL)
 
 
 def test_too_few_burns_or_wrong_words_are_refused():
     m = a_branch(RCS.model, 0.0, 1)
     for words in ({"first": "A-3"}, {"first": "nobody"}, {"false_alarm": 0.0}):
         with pytest.raises(BadInput):
-            watch_maneuvers(m, **words)
+            gates_watch(m, **words)
     with pytest.raises(BadInput, match="10 burns come before"):
-        watch_maneuvers(m.take(range(10)))
+        gates_watch(m.take(range(10)))
 
 
 def test_record_and_text():
-    w = watch_maneuvers(a_branch(RCS.model, 0.1, 1), first="OTM-156")
+    w = gates_watch(a_branch(RCS.model, 0.1, 1), first="OTM-156")
     record = w.record()
     assert record["verdict"] == "alarm" and record["burns_before"] == 36 and len(record["burns"]) == 4
     assert record["burns"][2]["detectable_underburn"] > 0.2 and set(record["shift"]["posterior"]) == {

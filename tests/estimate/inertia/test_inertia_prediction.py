@@ -5,6 +5,7 @@ import pytest
 
 from asflown.craft.load import load_craft
 from asflown.craft.model import tensor
+from asflown.estimate.inertia import prediction as doubt
 from asflown.estimate.inertia.prediction import ROWS, Prediction, compare_inertia, predicted_inertia
 from asflown.kit.errors import BadInput
 from asflown.kit.timeline import utc_to_tai_ns
@@ -63,7 +64,7 @@ def test_published_cruise_estimate_against_the_sum_of_components():
 
 
 def test_published_tensors_are_those_of_rigid_bodies():
-    margins = [compare_inertia(tensor(m.elements), predicted_inertia(CASSINI, m.date)).triangle_margin for m in CASSINI.mass_properties
+    margins = [compare_inertia(tensor(m.elements), predicted_inertia(CASSINI, m.date)).triangle_margin_kgm2 for m in CASSINI.mass_properties
                if m.source.startswith("001")]  # fmt: skip
     assert len(margins) == 8 and 1200 < min(margins) and max(margins) < 2010  # kg m2
 
@@ -89,10 +90,10 @@ def test_sigma_of_the_estimate_can_leave_a_requirement_open():
 ])  # fmt: skip
 def test_a_units_factor_is_doubted(factor, words):
     p = predicted_inertia(CASSINI, None)
-    said = [d for d in compare_inertia(factor * p.inertia, p).doubts if "times the predicted" in d]
-    assert len(said) == bool(words) and all(w in said[0] for w in words)
-    lopsided = factor * p.inertia * np.diag([1, 3, 1]) if factor != 1.1 else p.inertia
-    assert not any("times the predicted" in d for d in compare_inertia(lopsided, p).doubts)
+    said = compare_inertia(factor * p.inertia_kgm2, p).doubts.of(doubt.WRONG_UNIT)
+    assert len(said) == bool(words) and all(w in said[0].about["guesses"] for w in words)
+    lopsided = factor * p.inertia_kgm2 * np.diag([1, 3, 1]) if factor != 1.1 else p.inertia_kgm2
+    assert not compare_inertia(lopsided, p).doubts.has(doubt.WRONG_UNIT)
 
 
 def test_a_tensor_no_body_has_is_doubted():
@@ -101,18 +102,18 @@ def test_a_tensor_no_body_has_is_doubted():
         (np.diag([1.0, 1.0, 3.0]), "triangle margin"),
         (np.diag([-1.0, 5.0, 5.0]), "smallest principal moment"),
     ):
-        assert any(words in d for d in compare_inertia(I_B, p).doubts)
+        assert compare_inertia(I_B, p).doubts.of(doubt.IMPOSSIBLE).about(quantity=words)
 
 
 def test_which_prediction_is_taken():
     late = predicted_inertia(CASSINI, int(utc_to_tai_ns("2015-09-29T00:00:00")))
-    assert late.date == "2004-12-25" and "nearest there is to 2015-09-29" in late.doubts[0]
+    assert late.date == "2004-12-25" and late.doubts.of(doubt.OLD_PREDICTION).about(date="2015-09-29")
     given = predicted_inertia(load_craft("cassini", inertia=(5, 5, 5, 0, 0, 0)), None)
-    assert given.source == "given by the user" and not given.doubts and given.inertia[0, 0] == 5
+    assert given.source == "given by the user" and not given.doubts and given.inertia_kgm2[0, 0] == 5
     ratios = load_craft("inspiresat1")
     p = predicted_inertia(ratios, None)
-    assert any("no prediction" in d for d in p.doubts)
-    table = compare_inertia(1.05 * p.inertia, p, relative=True)
+    assert p.doubts.has(doubt.NO_PREDICTION)
+    table = compare_inertia(1.05 * p.inertia_kgm2, p, relative=True)
     assert table.unit == "per spin inertia" and table.row("Ixy").verdict is None and table.row("Ixx").verdict is None
     with pytest.raises(BadInput, match="no inertia to compare"):
         predicted_inertia(CASSINI.model_copy(update={"mass_properties": ()}), None)

@@ -14,28 +14,52 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import f as fisher
 
+from ...kit.digits import interval
+from ...kit.doubts import Doubts, Kind, Severity
 from ...kit.errors import BadInput
+from ...kit.schema import Annotated, Doc, Interval, TypedDict
+from ...kit.table import Table
 
 if TYPE_CHECKING:
     from ...dynamics.flyby import Flyby
     from ..firing import Gained
 
+NO_ATMOSPHERE = Kind(
+    "density.no-atmosphere", Severity.SUSPECT,
+    "no exponential atmosphere explains the momentum gained (chi-square {chi_square:.1f} per degree of freedom)",
+    "Check that the record is of the flyby of {flyby}; see the residual density with --plot.",
+)  # fmt: skip
+
+#: Chi-square per degree of freedom beyond which an atmosphere does not explain the record.  Assumed.
+_MISFIT = 3.0
 #: Scale heights tried [m], then as many again within those that fit, and instants within a step at which the atmosphere is summed.
 _HEIGHTS_M = np.geomspace(10e3, 300e3, 401)
 _WITHIN = 8
 _FEWEST = 8
 
 
-@dataclass(frozen=True)
-class AtmosphereFit:
-    """rho = density exp(-(h - altitude) / scale height); 95 % intervals, an open end None; ``misfit``: chi square over its
-    degrees of freedom."""
+class AtmosphereRecord(TypedDict):
+    """rho = density exp(-(h - altitude) / scale height)."""
 
     altitude_m: float
     density_kgm3: float
-    density_95: tuple[float, float]
+    density_ci95_kgm3: Interval
     scale_height_m: float
-    scale_height_95: tuple[float | None, float | None]
+    scale_height_ci95_m: Interval
+    misfit: Annotated[float, Doc("chi-square per degree of freedom")]
+    steps: Annotated[int, Doc("of momentum, used by the fit")]
+
+
+@dataclass(frozen=True)
+class AtmosphereFit:
+    """rho = density exp(-(h - altitude) / scale height); 95 % intervals, an open end None; ``misfit``: chi-square per degree
+    of freedom."""
+
+    altitude_m: float
+    density_kgm3: float
+    density_ci95_kgm3: tuple[float, float]
+    scale_height_m: float
+    scale_height_ci95_m: tuple[float | None, float | None]
     misfit: float
     steps: int
 
@@ -43,25 +67,42 @@ class AtmosphereFit:
         return self.density_kgm3 * np.exp(-(np.asarray(altitude_m, float) - self.altitude_m) / self.scale_height_m)
 
     def record(self) -> dict:
-        low, high = self.scale_height_95
-        return {
-            "altitude_km": self.altitude_m / 1e3, "density_kgm3": self.density_kgm3, "density_ci95_kgm3": list(self.density_95),
-            "scale_height_km": self.scale_height_m / 1e3,
-            "scale_height_ci95_km": [None if v is None else v / 1e3 for v in (low, high)],
-            "misfit": self.misfit, "steps": self.steps,
+        record = {
+            "altitude_m": self.altitude_m, "density_kgm3": self.density_kgm3,
+            "density_ci95_kgm3": list(self.density_ci95_kgm3), "scale_height_m": self.scale_height_m,
+            "scale_height_ci95_m": list(self.scale_height_ci95_m), "misfit": self.misfit, "steps": self.steps,
+        }  # fmt: skip
+        return record | {  # keys of earlier versions
+            "altitude_km": self.altitude_m / 1e3, "scale_height_km": self.scale_height_m / 1e3,
+            "scale_height_ci95_km": [None if v is None else v / 1e3 for v in self.scale_height_ci95_m],
         }  # fmt: skip
 
-    def __str__(self) -> str:
-        low, high = ("open" if v is None else f"{v / 1e3:.1f}" for v in self.scale_height_95)
-        return (
-            f"{self.density_kgm3:.3g} kg/m3 ({self.density_95[0]:.3g} to {self.density_95[1]:.3g}) {self.altitude_m / 1e3:.0f} km high, "
-            f"scale height {self.scale_height_m / 1e3:.1f} km ({low} to {high})"
+    def table(self) -> Table:
+        low, high = (None if v is None else v / 1e3 for v in self.scale_height_ci95_m)
+        return Table(
+            "Exponential atmosphere",
+            (
+                (
+                    f"density at {self.altitude_m / 1e3:g} km [kg/m3]",
+                    f"{self.density_kgm3:.3g}",
+                    interval(*self.density_ci95_kgm3),
+                ),
+                ("scale height [km]", f"{self.scale_height_m / 1e3:.1f}", interval(low, high)),
+            ),
+            ("", "value", "95 % interval"),
+            (f"chi-square per degree of freedom {self.misfit:.2f}, {self.steps} steps of momentum",),
         )
+
+    def doubts(self, flyby: str) -> Doubts:
+        return Doubts([NO_ATMOSPHERE(chi_square=self.misfit, flyby=flyby)] if self.misfit > _MISFIT else [])
 
 
 def fit_atmosphere(g: Gained, flyby: Flyby, closest_s: float, per_density, gravity=None) -> AtmosphereFit:
-    """``closest_s``: of closest approach, from the epoch.  ``per_density``: of times from closest approach, N m per kg/m3 about the axis, with its sign.
-    ``gravity``: instants [s from closest approach] and the gravity gradient's torque [N m], taken off.
+    """The exponential atmosphere for which the momentum gained is likeliest.
+
+    ``closest_s``: closest approach, from the epoch [s].  ``per_density``: torque per density about the axis, with its sign, at
+    times from closest approach [N m / (kg/m3)].  ``gravity``: instants [s from closest approach] and the gravity gradient's
+    torque [N m], taken off.
 
     Raises BadInput for a body without an atmosphere, and where too few steps are near."""
     air = flyby.moon.atmosphere

@@ -1,4 +1,4 @@
-"""One density from the torque about several axes, each weighed by its noise, and whether they agree (004 eq 21 as a vector)."""
+"""One density from the torque about several axes, each weighed by its noise, and whether they agree (plume paper eq 21 as a vector)."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...kit.regression import memory
-from .result import Agreement
+from .parts import Agreement
 
 if TYPE_CHECKING:
     from ..torque import TorqueResult
+    from .drag import DragAlong
+    from .gas_torque import GasTorque
 
-#: Gas tells by its torque where it turns the craft by at least this share of the most it does along the flyby.
+#: The torque tells the density where the torque per density is at least this share of its largest along the flyby.  Assumed.
 _LEAST_ARM = 0.1
-#: Where no axis sees more than this, no gas is taken to be. [sigma]
+#: Where no axis sees more than this, there is assumed to be no gas. [sigma]  Assumed.
 _SEEN = 3.0
 
 
@@ -34,9 +36,9 @@ def weights(K: np.ndarray, sigma) -> np.ndarray:
 
 
 def agreement_of(each, sigma, rho, known) -> Agreement | None:
-    """Whether several axes tell one density: chi-square of what each leaves where gas is looked for, in independent instants.
+    """Whether several axes tell one density: chi-square of the residuals of each where gas is looked for, in independent instants.
 
-    How alike neighbours are is learnt where no gas is seen: amid it a disagreement itself would make them so."""
+    The correlation of neighbouring residuals is taken where no gas is seen: within it, a disagreement would itself correlate them."""
     if sigma is None or each.shape[1] < 2:
         return None
     told = np.isfinite(each) & np.isfinite(sigma) & (sigma > 0)  # an axis without an arm tells nothing
@@ -49,14 +51,15 @@ def agreement_of(each, sigma, rho, known) -> Agreement | None:
     return Agreement(float(np.sum(left[known] ** 2)) / alike, beside / alike) if beside else None
 
 
-def drawn_densities(torque: TorqueResult, axes, middle: float, time_s, K, weight, gravity):
+def drawn_densities(torque: TorqueResult, gas: GasTorque, drag: DragAlong, closest_s: float, weight):
     """Instants from closest approach and densities (D, F) drawn from the torque's posterior; None where there is none."""
     if torque.paths_Nm is None:
-        return None, None
-    t = torque.paths_time_s - middle
+        return None
+    t = torque.paths_time_s - closest_s
+    K = drag.at(gas.time_s)
     drawn = np.zeros(torque.paths_Nm.shape[:2])
-    for i, j in enumerate(axes):
-        off = 0.0 if gravity is None else np.interp(t, time_s, gravity[:, i])
-        k, w = np.interp(t, time_s, K[:, i]), np.interp(t, time_s, weight[:, i])
-        drawn += np.where(w > 0, w * (torque.paths_Nm[:, :, j] - off) / np.where(k == 0, np.inf, k), 0.0)
+    for i, j in enumerate(drag.axes):
+        k, w = np.interp(t, gas.time_s, K[:, j]), np.interp(t, gas.time_s, weight[:, i])
+        off = torque.paths_Nm[:, :, j] - gas.gravity_at(t, i)
+        drawn += np.where(w > 0, w * off / np.where(k == 0, np.inf, k), 0.0)
     return t, drawn

@@ -1,20 +1,21 @@
-"""Torque per density along a flyby, about every axis that gas turns: 1/2 C_D V^2 A u x (r_CP - r_CM)  (004 eqs 21, 22).
+"""Torque per density along a flyby, about every axis that gas turns: 1/2 C_D V^2 A u x (r_CP - r_CM)  (plume paper eqs 21, 22).
 
-004 takes speed, area and arm at closest approach for all of it, and one axis.  A table gives them over time, the arm as a
-vector: then one density explains the torque about all axes at once.
+The plume paper takes speed, area and arm at closest approach for all of the flyby, and one axis.  A table gives them over
+time, the arm as a vector: then one density explains the torque about all axes at once.
 """
 
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...dynamics.drag import PRINTED_E3, torque_per_density
-from ...kit.errors import BadInput
+from ...kit.doubts import Doubt, Doubts, Kind, Severity
+from ...kit.errors import BadInput, check_choice
 from ...kit.quantities import si_factor
 from ...telemetry.channels import AXES, split_header
 
@@ -22,42 +23,106 @@ if TYPE_CHECKING:
     from ...craft.model import Aerodynamics, Craft
     from ...dynamics.flyby import Flyby
 
-#: What 004 judges its torque to be off by, and what else is (section VI): their root sum of squares is 7.73 %.
+#: Errors that the plume paper judges its torque (shape) and its drag (scale) to have; section VI: root sum of squares 7.73 %.
 PRINTED_SHAPE, PRINTED_SCALE = 0.05, 0.059
 _REACH_S = 1200.0  # speeds are followed for so long before and after closest approach
-#: What a table should hold: where jets are met; and by how much it may change from row to row, and its speed differ from the flyby's.
+#: What a table should hold: where jets are met [s]; and by how much it may change from row to row, and its speed differ from the
+#: flyby's, as shares.  Assumed.
 _COVERS_S, _STEP, _UNLIKE = (-60.0, 160.0), 0.3, 0.2
 _UNITS = {"time": "s", "speed": "m/s", "area": "m2", "arm_x": "m", "arm_y": "m", "arm_z": "m"}
 _REMEDY = "Write a CSV with the header time [s],speed [m/s],area [m2],arm_x [m],arm_y [m],arm_z [m]: times from closest approach increasing; speed may be left out."
 
+SCALE_UNKNOWN = Kind(
+    "density.scale-unknown", Severity.SUSPECT,
+    "projected area and moment arm are those of the attitude at {known_at}, not at {flyby}: the density's scale is not known",
+    "Give --area and --arm, or --drag-table.",
+)  # fmt: skip
+CONSTANT_DRAG = Kind(
+    "density.constant-drag", Severity.NOTE, "{what} are assumed constant through the flyby", "Give --drag-table."
+)
+PRINTED_ERRORS = Kind(
+    "density.printed-errors", Severity.CAUTION,
+    "printed method: sigma is the plume paper's judgement of 5 % (shape) and 5.9 % (scale), not estimated from this record",
+    "Use --variant corrected.",
+)  # fmt: skip
+DRAG_COEFFICIENT_ONLY = Kind(
+    "density.drag-coefficient-only", Severity.CAUTION,
+    "the scale's sigma holds the error of the drag coefficient only: area and arm are taken as exact",
+    "Give scale_sigma in the craft file.",
+)  # fmt: skip
+ARM_THROUGH_ZERO = Kind(
+    "density.arm-through-zero", Severity.NOTE,
+    "the arm about {axis} passes through zero: near there its torque does not tell the density",
+)  # fmt: skip
+TABLE_SHORT = Kind(
+    "density.drag-table-short", Severity.CAUTION,
+    "the drag table covers {start_s:+.0f} to {stop_s:+.0f} s only: its first and last values are held beyond",
+    "Add rows to the drag table.",
+)  # fmt: skip
+TABLE_COARSE = Kind(
+    "density.drag-table-coarse", Severity.CAUTION,
+    "the drag table changes by {change_percent:.0f} % from {start_s:+.0f} to {stop_s:+.0f} s: it is interpolated linearly there",
+    "Give rows closer together.",
+)  # fmt: skip
+TABLE_SPEED = Kind(
+    "density.drag-table-speed", Severity.SUSPECT,
+    "the drag table's speed is {ratio:.2g} times that of {flyby}",
+    "Check that the table is of this flyby, and its unit of speed.",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class DragGiven:
+    """What the user gives in place of the craft's drag: an axis, area [m2] and arm [m], or a table (a CSV file)."""
+
+    axis: str | None = None
+    area_m2: float | None = None
+    arm_m: float | None = None
+    table: Path | str | None = None
+
+    @property
+    def replaces(self) -> bool:
+        """Whether area, arm or a table is given."""
+        return any(v is not None for v in (self.area_m2, self.arm_m, self.table))
+
 
 @dataclass(frozen=True)
 class DragAlong:
-    """Torque per density (K, 3) [N m / (kg/m3)] at times from closest approach, lines between, its ends held beyond.
+    """Torque per density (K, 3) [N m / (kg/m3)] at times from closest approach, interpolated linearly, its ends held beyond.
 
-    ``axes``: those about which gas turns the craft; ``signed``: whether the arm's sign is known; ``scale``: one sigma of all, as a share; None where not known."""
+    ``axes``: those about which gas turns the craft; ``signed``: whether the arm's sign is known, else it is ``sign``;
+    ``scale_sigma``: one sigma of all, as a share; None where not known."""
 
     time_s: np.ndarray
     per_density: np.ndarray
     axes: tuple[int, ...]
     signed: bool
-    scale: float | None
+    scale_sigma: float | None
     settings: dict
-    doubts: tuple[str, ...]
+    doubts: Doubts
+    sign: float = 1.0
 
     def at(self, time_s) -> np.ndarray:
         """(N, 3) [N m / (kg/m3)]"""
-        return np.stack([np.interp(time_s, self.time_s, k) for k in self.per_density.T], axis=-1)
+        return self.sign * np.stack([np.interp(time_s, self.time_s, k) for k in self.per_density.T], axis=-1)
+
+    def about(self, axis: int, time_s) -> np.ndarray:
+        """About one axis, of the shape of ``time_s``. [N m / (kg/m3)]"""
+        return self.at(time_s)[..., axis]
+
+    def as_pushes(self, torque_Nm: np.ndarray) -> DragAlong:
+        """With the sign, where it is not known, that makes the density positive at the largest of these torques (N,)."""
+        if self.signed:
+            return self
+        return replace(self, sign=float(np.sign(torque_Nm[np.argmax(np.abs(torque_Nm))])) or 1.0)
 
     @property
     def names(self) -> str:
         return "".join(AXES[j] for j in self.axes)
 
 
-def flyby_drag(craft: Craft, flyby: Flyby, axis=None, area_m2=None, arm_m=None, table=None, printed=False) -> DragAlong:
-    """The craft's drag with what the user gives in its place.
-
-    ``table``: a CSV file of time, speed, area and arm vector (then all its axes, or the one named).
+def flyby_drag(craft: Craft, flyby: Flyby, given: DragGiven, variant: str = "corrected") -> DragAlong:
+    """The craft's drag, with what the user gives in its place; of a table all its axes, or the one named.
 
     Raises BadInput where drag or its axis is not known, for impossible sizes, and for a table that cannot be read."""
     air = craft.aerodynamics
@@ -66,47 +131,54 @@ def flyby_drag(craft: Craft, flyby: Flyby, axis=None, area_m2=None, arm_m=None, 
             f"the drag of {craft.name} is not known",
             remedy="Describe it under [aerodynamics] in the craft file: drag_coefficient, projected_area, moment_arm.",
         )
-    if axis is not None and axis not in AXES:
-        raise BadInput(f"axis {axis!r} is not known", remedy="Choose one of: x, y, z.")
-    if printed and (
-        flyby.name != "E3" or any(v is not None for v in (area_m2, arm_m, table)) or (axis or air.axis) != "z"
-    ):
+    check_choice(given.axis, (None, *AXES), "axis")
+    if variant == "printed":
+        return _printed(air, flyby, given)
+    if given.table is not None:
+        return _from_table(air, flyby, given)
+    if given.axis not in (None, air.axis) and given.arm_m is None:
+        raise BadInput(
+            f"the moment arm of {craft.name} is known about {air.axis} only",
+            remedy=f"Give that about {given.axis}: --arm.",
+        )
+    return _constant(air, flyby, given)
+
+
+def _printed(air: Aerodynamics, flyby: Flyby, given: DragGiven) -> DragAlong:
+    """The plume paper's constant."""
+    if flyby.name != "E3" or given.replaces or (given.axis or air.axis) != "z":
         raise BadInput(
             "the printed torque per density is that of E3 about z, with its own area and arm",
             remedy="Use --variant corrected.",
         )
-    scale: float | None
-    scale, doubts = (PRINTED_SCALE, []) if printed else _scale(air)
-    if table is not None:
-        if area_m2 is not None or arm_m is not None:
-            raise BadInput("area and arm are in the drag table, and given beside it", remedy="Leave out --area, --arm.")
-        return _from_table(Path(table), air, flyby, axis, scale, doubts)
-    about = axis or air.axis
-    if about != air.axis and arm_m is None:
-        raise BadInput(
-            f"the moment arm of {craft.name} is known about {air.axis} only", remedy=f"Give that about {about}: --arm."
-        )
-    for name, value in {"projected area": area_m2, "moment arm": arm_m}.items():
-        if value is not None and not 0 < value < 1e6:
-            raise BadInput(f"a {name} of {value:g} is not possible", remedy="Give a positive size.")
-    area, arm = area_m2 or air.projected_area, arm_m or air.moment_arm
-    if air.flyby and air.flyby != flyby.name and None in (area_m2, arm_m):
-        scale = None
-        doubts.append(
-            f"projected area and moment arm are those of the attitude at {air.flyby}, not at {flyby.name}: the density's scale is not known (--area, --arm)"
-        )
-    t, speed = _speeds(flyby)
-    constant = "speed, area and arm" if len(t) == 1 else "area and arm"
-    doubts.append(f"{constant} count as constant through the flyby (--drag-table)")
-    if printed:
-        doubts.append("printed method: sigma is 004's judgement of 5 % (shape) and 5.9 % (scale), not this record's")
-    k = np.zeros((len(t), 3))
-    k[:, AXES.index(about)] = PRINTED_E3 if printed else torque_per_density(air.drag_coefficient, speed, area, arm)
     settings = {
-        "speed_m_s": flyby.speed_m_s, "drag_coefficient": None if printed else air.drag_coefficient,
-        "projected_area_m2": None if printed else area, "moment_arm_m": None if printed else arm,
+        "speed_m_s": flyby.speed_m_s, "drag_coefficient": None, "projected_area_m2": None, "moment_arm_m": None,
     }  # fmt: skip
-    return DragAlong(t, k, (AXES.index(about),), False, scale, settings, tuple(doubts))
+    doubts = Doubts([CONSTANT_DRAG(what="speed, area and arm"), PRINTED_ERRORS()])
+    return DragAlong(np.zeros(1), np.array([[0.0, 0.0, PRINTED_E3]]), (2,), False, PRINTED_SCALE, settings, doubts)
+
+
+def _constant(air: Aerodynamics, flyby: Flyby, given: DragGiven) -> DragAlong:
+    """Area and arm of one attitude, and the flyby's speed."""
+    for name, value in {"projected area": given.area_m2, "moment arm": given.arm_m}.items():
+        if value is not None and not 0 < value < 1e6:
+            raise BadInput(f"the {name} must be positive, and it is {value:g}", remedy="Give a positive size.")
+    scale_sigma: float | None
+    scale_sigma, doubts = _scale(air)
+    area, arm = given.area_m2 or air.projected_area, given.arm_m or air.moment_arm
+    if air.flyby and air.flyby != flyby.name and None in (given.area_m2, given.arm_m):
+        scale_sigma = None
+        doubts.append(SCALE_UNKNOWN(known_at=air.flyby, flyby=flyby.name))
+    t, speed = _speeds(flyby)
+    doubts.append(CONSTANT_DRAG(what="speed, area and arm" if len(t) == 1 else "area and arm"))
+    j = AXES.index(given.axis or air.axis)
+    k = np.zeros((len(t), 3))
+    k[:, j] = torque_per_density(air.drag_coefficient, speed, area, arm)
+    settings = {
+        "speed_m_s": flyby.speed_m_s, "drag_coefficient": air.drag_coefficient, "projected_area_m2": area,
+        "moment_arm_m": arm,
+    }  # fmt: skip
+    return DragAlong(t, k, (j,), False, scale_sigma, settings, Doubts(doubts))
 
 
 def _speeds(flyby: Flyby) -> tuple[np.ndarray, np.ndarray]:
@@ -116,15 +188,17 @@ def _speeds(flyby: Flyby) -> tuple[np.ndarray, np.ndarray]:
     return (t, speed) if np.ptp(speed) > 1e-9 * flyby.speed_m_s else (np.zeros(1), np.array([flyby.speed_m_s]))
 
 
-def _scale(air: Aerodynamics) -> tuple[float, list[str]]:
+def _scale(air: Aerodynamics) -> tuple[float, list[Doubt]]:
     """One sigma of the torque per density, as a share."""
     if air.scale_sigma is not None:
         return air.scale_sigma, []
-    doubt = "only the drag coefficient's error is in the scale: area and arm count as exact (scale_sigma in the craft file would hold all)"
-    return air.drag_coefficient_sigma / air.drag_coefficient, [doubt]
+    return air.drag_coefficient_sigma / air.drag_coefficient, [DRAG_COEFFICIENT_ONLY()]
 
 
-def _from_table(path: Path, air: Aerodynamics, flyby: Flyby, axis, scale: float, doubts: list[str]) -> DragAlong:
+def _from_table(air: Aerodynamics, flyby: Flyby, given: DragGiven) -> DragAlong:
+    path, axis = Path(str(given.table)), given.axis
+    if given.area_m2 is not None or given.arm_m is not None:
+        raise BadInput("area and arm are given, and the drag table holds them too", remedy="Leave out --area, --arm.")
     column = _read(path)
     t, area = column["time"], column["area"]
     speed = column["speed"] if "speed" in column else flyby.speed(t)
@@ -136,39 +210,29 @@ def _from_table(path: Path, air: Aerodynamics, flyby: Flyby, axis, scale: float,
     if not axes:
         where = "any axis" if axis is None else axis
         raise BadInput(f"this drag table has no arm about {where}", file=path, remedy=_REMEDY)
-    for j in axes:
-        if np.any(k[:, j] > 0) and np.any(k[:, j] < 0):
-            doubts = [
-                *doubts,
-                f"the arm about {AXES[j]} passes through zero: near there its torque says nothing of the density",
-            ]
-    doubts = [*doubts, *_table_doubts(t, speed, k, flyby)]
+    scale_sigma, doubts = _scale(air)
+    doubts += [ARM_THROUGH_ZERO(axis=AXES[j]) for j in axes if np.any(k[:, j] > 0) and np.any(k[:, j] < 0)]
     settings = {
         "drag_table": str(path), "drag_coefficient": air.drag_coefficient, "speed_m_s": [speed.min(), speed.max()],
         "projected_area_m2": [area.min(), area.max()], "table_from_s": t[0], "table_to_s": t[-1],
     }  # fmt: skip
-    return DragAlong(t, k, axes, True, scale, settings, tuple(doubts))
+    doubts += _table_doubts(t, speed, k, flyby)
+    return DragAlong(t, k, axes, True, scale_sigma, settings, Doubts(doubts))
 
 
-def _table_doubts(t, speed, k, flyby: Flyby) -> list[str]:
+def _table_doubts(t, speed, k, flyby: Flyby) -> list[Doubt]:
     doubts = []
     if t[0] > _COVERS_S[0] or t[-1] < _COVERS_S[1]:
-        doubts.append(
-            f"the drag table runs from {t[0]:+.0f} to {t[-1]:+.0f} s only: its first and last values are held beyond"
-        )
+        doubts.append(TABLE_SHORT(start_s=float(t[0]), stop_s=float(t[-1])))
     size = np.linalg.norm(k, axis=1)
     change = np.linalg.norm(np.diff(k, axis=0), axis=1) / size.max()
     if change.max() > _STEP:
         i = int(np.argmax(change))
-        doubts.append(
-            f"the drag table changes by {100 * change[i]:.0f} % from {t[i]:+.0f} to {t[i + 1]:+.0f} s: lines stand for what is between (rows closer together)"
-        )
+        doubts.append(TABLE_COARSE(change_percent=100 * float(change[i]), start_s=float(t[i]), stop_s=float(t[i + 1])))
     near = int(np.argmin(np.abs(t)))
     unlike = float(speed[near] / flyby.speed(t[near]))
     if abs(unlike - 1) > _UNLIKE:
-        doubts.append(
-            f"the drag table's speed is {unlike:.2g} times that of {flyby.name}: is it the right flyby, and unit?"
-        )
+        doubts.append(TABLE_SPEED(ratio=unlike, flyby=flyby.name))
     return doubts
 
 

@@ -1,14 +1,14 @@
-"""The peak of a plume: from jets near the known sources, and a remainder that is free.
+"""The peak of a plume: from jets near the known sources, and a free remainder.
 
-A smoothed curve has its peak early where the density rises slowly to a cusp and falls fast after: no smooth prior knows of
+A smoothed curve has its peak early where the density rises slowly to a cusp and falls fast after: no smooth prior has
 cusps.  Here the density is, as near as the data ask,
 
     rho = sum_j K_j (R/r_j)^1.5 exp(-(theta_j/w)^n)  +  remainder
 
 with every choice of the sources, their common width w and exponent n, all of them leaning by one angle or by none, and a
 remainder that is a Gaussian process of a share of the density's own size up to some altitude, and of all of it above: jets
-of this form need not hold far out.  One choice is no jets at all and the smooth density.  Densities K are linear and not negative, so each choice has
-its evidence in closed form; peaks are those of densities drawn from all of them together.
+of this form need not hold far out.  One choice is no jets at all and the smooth density.  Densities K are linear and not
+negative, so each choice has its evidence in closed form; peaks are those of densities drawn from all of them together.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from .axes import tells
 if TYPE_CHECKING:
     from ...dynamics.flyby import Flyby
 
+# The choices below are assumed; studies/plume_peak.py measures how well peaks come out with them.
 POWERS = (1.0, 1.4, 2.0)
 #: Steps of 2.6 %: of 11 % they are wider than the posterior, which then sits on one of them and says too little.
 WIDTHS_RAD = np.geomspace(0.1, 1.2, 96)

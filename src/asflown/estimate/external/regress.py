@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from ...kit.regression import memory
+from ...kit.scatter import robust_sigma
 from ..subject import FEWEST
 
 #: An instant further off than this many robust sigma does not count.
@@ -56,7 +57,7 @@ def regress(rows, y) -> Fit:
         normal = np.einsum("nij,nik->jk", weighted, X)
         values = np.linalg.solve(normal, np.einsum("nij,ni->j", weighted, y))
         left = y - X @ values
-        robust = 1.4826 * np.median(np.abs(left[used]), axis=0)
+        robust = robust_sigma(left[used], axis=0)
         again = (np.abs(left) <= np.maximum(OUTLYING * robust, 1e-12 * np.abs(y).max())).all(axis=1)
         if again.sum() < FEWEST:
             again = used

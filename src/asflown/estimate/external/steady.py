@@ -26,7 +26,7 @@ from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput, check_choice, some_of
 from ...kit.regression import robust_line
 from ...kit.result import recorded
-from ...kit.rotations import rotation, turned_by
+from ...kit.rotations import rotation
 from ...kit.timeline import NS
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
@@ -279,7 +279,7 @@ def _turn(s: Samples, given):
     if given is not None:
         return np.asarray(given, float), np.zeros(3), "the user", 0.0, []
     if s.attitude is not None:
-        turned = (s.attitude[0].inv() * s.attitude).as_rotvec()
+        turned = s.turned.as_rotvec()
         lines = [robust_line(t, turned[:, j]) for j in range(3)]
         w, sigma = np.array([v[1] for v, _, _ in lines]), np.sqrt([c[1, 1] for _, c, _ in lines])
         return w, sigma, "quaternion", 0.0, []
@@ -307,19 +307,17 @@ def _momentum(subject: Subject, frame: str) -> ExternalTorqueResult:
     t, doubts, unknown = s.seconds, [], np.zeros(3)
     if s.attitude is not None:
         from_start, turn_from = s.attitude[0].inv(), "quaternion"
-        turned = from_start * s.attitude
     elif frame == "inertial":
         raise BadInput("no quaternion: the inertial frame is not known", remedy="Use --frame body.")
     else:
         from_start, turn_from = Rotation.identity(), "body rates"
-        turned = turned_by(t, s.rates)
         unknown = _crossed(s.momentum.mean(axis=0), np.full(3, GYRO_BIAS))
         doubts.append(ATTITUDE_FROM_RATES())
     if frame == "body":
-        G = cumulative_trapezoid(turned.as_matrix(), t, axis=0, initial=0)
+        G = cumulative_trapezoid(s.turned.as_matrix(), t, axis=0, initial=0)
     else:
         G = t[:, None, None] * from_start.as_matrix()
-    return _fitted(subject, s, _Course("momentum", frame, s.momentum, turned, G, unknown, turn_from, doubts))
+    return _fitted(subject, s, _Course("momentum", frame, s.momentum, s.turned, G, unknown, turn_from, doubts))
 
 
 def _fitted(subject: Subject, s: Samples, course: _Course) -> ExternalTorqueResult:

@@ -1,8 +1,8 @@
 """What thrusters did: on-times and pulse counts, missed pulses, branches, the impulse that firing gave."""
 
 from .branches import branch_change, other_branch, undescribed
-from .chains import Chain, Nuisance, momentum_chain
-from .counters import Counters, counters_of, step_of
+from .chains import Chain, Nuisance, Parameter, Source, momentum_chain
+from .counters import Counters, check_thrusters, control_step_s, counters_of, step_of
 from .firings import Firings, firings_of
 from .impulse import THRUST_SHARE, Gained, gained
 from .missed_pulses import PULSES, gained_idle, pulse_Nms, uncounted
@@ -10,7 +10,7 @@ from .priors import CENTER_SIGMA, Priors, center_doubts, priors_for
 from .valve import valve_of
 
 __all__ = [
-    "CENTER_SIGMA", "PULSES", "THRUST_SHARE", "Chain", "Counters", "Firings", "Gained", "Nuisance", "Priors",
-    "branch_change", "center_doubts", "counters_of", "firings_of", "gained", "gained_idle", "momentum_chain",
-    "other_branch", "priors_for", "pulse_Nms", "step_of", "uncounted", "undescribed", "valve_of",
+    "CENTER_SIGMA", "PULSES", "THRUST_SHARE", "Chain", "Counters", "Firings", "Gained", "Nuisance", "Parameter", "Priors",
+    "Source", "branch_change", "center_doubts", "check_thrusters", "control_step_s", "counters_of", "firings_of", "gained",
+    "gained_idle", "momentum_chain", "other_branch", "priors_for", "pulse_Nms", "step_of", "uncounted", "undescribed", "valve_of",
 ]  # fmt: skip

@@ -1,6 +1,6 @@
 """Which branch of thrusters is in use, by telemetry and by the craft file; thrusters of two branches sit in one place.
 
-Their torques are the same, so momentum cannot tell them apart: only their counters, their thrust, and this channel can.
+Their torques are the same, so momentum cannot distinguish them: only their counters, their thrust, and this channel can.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def branches_in_use(telemetry: Telemetry) -> list[str]:
 
 
 def branch_change(telemetry: Telemetry) -> str | None:
-    """When the branch first changes, in words; None where it does not."""
+    """When the branch first changes, as text; None where it does not."""
     if len(branches_in_use(telemetry)) < 2:
         return None
     c = telemetry.channel(CHANNEL).usable
@@ -37,7 +37,7 @@ def branch_change(telemetry: Telemetry) -> str | None:
 
 
 def undescribed(telemetry: Telemetry, thrusters: Sequence[Thruster]) -> str | None:
-    """The branch in use where the craft file describes another, with that one, in words."""
+    """The branch in use and the one described, as text, where the craft file describes another than is in use."""
     described = sorted({t.branch for t in thrusters if t.branch})
     other = [b for b in branches_in_use(telemetry) if b not in described]
     if not described or not other:
@@ -46,12 +46,12 @@ def undescribed(telemetry: Telemetry, thrusters: Sequence[Thruster]) -> str | No
 
 
 def other_branch(name: str, thrusters: Sequence[Thruster]) -> str | None:
-    """The thruster that momentum cannot tell from this one: another of the craft file in its place, else that of the other
-    branch.  None where neither is known."""
+    """The thruster that momentum cannot distinguish from this one: another of the craft file in its place, else that of the
+    other branch.  None where neither is known."""
     own = next(t for t in thrusters if t.name == name)
-    beside = [t for t in thrusters if t.name != name and (t.position, t.direction) == (own.position, own.direction)]
-    if beside:
-        return some_of([f"{t.name} of branch {t.branch}" if t.branch else t.name for t in beside])
+    same_place = [t for t in thrusters if t.name != name and (t.position, t.direction) == (own.position, own.direction)]
+    if same_place:
+        return some_of([f"{t.name} of branch {t.branch}" if t.branch else t.name for t in same_place])
     if not own.branch:
         return None
     other = {"A": "B", "B": "A"}.get(own.branch)

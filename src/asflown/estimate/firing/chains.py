@@ -1,38 +1,67 @@
-"""What a record says of thrust: chains of samples whose steps are impulses, with what may be wrong in them.
+"""Measurements of thrust: chains of samples whose steps are impulses, with their errors.
 
 A chain is momentum (three components) or velocity along an accelerometer (one).  From sample to sample it gains what the
-thrusters gave.  Samples have noise of their own, so that neighbouring steps share it with opposite signs; pulses scatter,
-which stays; firings of unknown time count early or late, which does not.
+thrusters gave.  Each sample has noise, which its two neighbouring steps share with opposite signs.  Errors of the pulses'
+size add up from step to step.  A firing whose time is not known counts in one step or the next, which does not add up.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from enum import StrEnum
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ...dynamics.pulses import Valve, expected_effective
 from ...kit.banded import Covariance
+from ...kit.scatter import robust_sigma
 
 if TYPE_CHECKING:
     from .counters import Known
     from .firings import Firings
+    from .priors import Priors
 
 #: Quiet steps from which the samples' noise is taken; with fewer it is what the fit leaves.
 _QUIET = 12
 #: Steps count as no more than so many times the usual one; the noise is at least this share of all that is gained.
 _FAR, _LEAST = 4.0, 1e-4
+#: Variance added to a step that does not count: beyond that of any step that does, in (N m s)^2 or (m/s)^2.
+_NOT_USED = 1e12
+
+
+class Source(StrEnum):
+    """What a parameter of a thrust's model stands for."""
+
+    THRUST = "thrust"
+    MEAN_THRUST = "mean thrust"
+    FALL_TIME = "fall time"
+    CENTER = "centre of mass"
+    SPIN_INERTIA = "spin inertia"
+    INERTIA = "inertia"
+    RATE_OFFSET = "rate offset"
+    ACCELEROMETER_BIAS = "accelerometer bias"
+    MASS = "mass"
+    UNCOUNTED = "pulses not counted"
+    LONG_PULSES = "pulses of minutes"
+    LASTING = "pulses that last"
+
+
+class Parameter(NamedTuple):
+    """One parameter; records that share it name it alike.  ``which``: the thruster, wheel, axis or record, '' for the only one."""
+
+    source: Source
+    which: str = ""
 
 
 @dataclass(frozen=True)
 class Nuisance:
-    """Something not known that shifts a chain's steps by its column, known beforehand to ``sigma``.
+    """A parameter that shifts a chain's steps in proportion to its column; its prior is zero with ``sigma``.
 
-    ``considered``: its uncertainty is counted and it is not itself estimated.  Spin inertia and inertia are so: their columns are
-    measured and share the noise of the steps, which would pull them towards whatever makes that smaller."""
+    ``considered``: its uncertainty is counted, but it is not estimated.  This is so for spin inertia and inertia: their columns
+    are measured and share the noise of the steps, which would bias their estimates."""
 
-    name: str
+    parameter: Parameter
     column: np.ndarray  # (K, d)
     sigma: float
     considered: bool = False
@@ -52,7 +81,7 @@ class Chain:
     step_s: float
     record: int  # its pulses are those of all chains of that record
     long_of: np.ndarray  # (L,): thrusters of pulses followed one by one
-    weak: np.ndarray  # (j,): share by which what was given may lie below the mean of its pulses
+    weak: np.ndarray  # (j,): share by which the impulse given may lie below the mean of its pulses
     sample_sigma: np.ndarray | None = None  # (K + 1,): noise of each sample where it is known
     nuisances: tuple[Nuisance, ...] = field(default=())
 
@@ -70,10 +99,13 @@ class Chain:
         return np.maximum(np.diff(self.known.pulses, axis=0), 0.0)
 
     @property
-    def long(self) -> dict[str, tuple[int, np.ndarray]]:
+    def long(self) -> dict[Parameter, tuple[int, np.ndarray]]:
         """Pulses of many steps, each with a thrust of its own: thruster, and on-time in every step (K,)."""
         steps = np.diff(self.known.long, axis=0)
-        return {f"pulse {k} of record {self.record}": (int(j), steps[:, k]) for k, j in enumerate(self.long_of)}
+        return {
+            Parameter(Source.LONG_PULSES, f"{k} of record {self.record}"): (int(j), steps[:, k])
+            for k, j in enumerate(self.long_of)
+        }
 
     @property
     def spread(self) -> np.ndarray:
@@ -93,12 +125,13 @@ class Chain:
         return np.stack([self.turn @ np.cross(-unit, self.along).T for unit in np.eye(3)])
 
     def effective(self, valve: Valve, more=0.0) -> np.ndarray:
-        """Impulse per newton, (K, j), with so many ``more`` pulses in each step. [s]"""
+        """Impulse per newton, (K, j), with ``more`` (K, j) pulses in each step. [s]"""
         whole = expected_effective(self.on_time_s, np.maximum(self.pulses + more, 0.0), self.step_s, valve)
         return whole - np.diff(to_come(self.known.duty, self.known.rate, valve)[0], axis=0)
 
     def noise(self, left) -> np.ndarray:
-        """Variance of the samples' own noise, (K + 1, d): known, from quiet steps, or from what a fit leaves (K, d) of all."""
+        """Variance of the samples' noise, (K + 1, d): as known, else from steps without firing, else from a fit's residuals ``left``
+        (K, d)."""
         if self.sample_sigma is not None:
             return np.square(self.sample_sigma)[:, None]
         return np.broadcast_to(self._noise(left), (len(self.steps) + 1, self.width))
@@ -107,21 +140,21 @@ class Chain:
         quiet = self.used & (self.on_time_s.sum(axis=1) == 0)
         quiet[1:] &= quiet[:-1]
         steps = self.steps[quiet] if quiet.sum() >= _QUIET else left[self.used]
-        typical = np.median(np.abs(steps), axis=0) / 0.6745
+        typical = robust_sigma(steps, axis=0)
         typical = np.where(typical > 0, typical, np.abs(steps).mean(axis=0))  # whole counts, most of them the same
         kept = np.minimum(np.abs(steps), _FAR * typical)
         least = _LEAST * np.abs(np.cumsum(self.steps[self.used], axis=0)).max()
         return 0.5 * np.maximum(np.mean(kept**2, axis=0), least**2)
 
     def together(self) -> np.ndarray:
-        """How much of their time each two thrusters fire together, (j, j): pairs come early and late at once."""
+        """Share of their time for which each two thrusters fire together, (j, j): timing errors of a pair are correlated."""
         T = self.on_time_s
         overlap = np.minimum(T[:, :, None], T[:, None, :]).sum(axis=0)
         own = np.sqrt(np.maximum(np.diag(overlap), 1e-300))
         return overlap / np.outer(own, own)
 
     def guessed(self) -> list[np.ndarray]:
-        """Thrusters whose pulses are guessed, those that always fire together as one."""
+        """Thrusters whose number of pulses is estimated, those that always fire together in one group."""
         left, groups = list(np.flatnonzero(self.known.spread[-1] > 0)), []
         alike = self.together() > 0.99
         while left:
@@ -131,7 +164,7 @@ class Chain:
         return groups
 
     def covariance(self, thrust_N, center, valve: Valve, pulse_scatter: float, noise) -> Covariance:
-        """Of the steps, for thrusts (j,); ``noise`` (K + 1, d): variance of the samples' own."""
+        """Of the steps, for thrusts (j,); ``noise`` (K + 1, d): variance of the samples' noise."""
         push = self.arms(center) * thrust_N  # (K, d, j)
         on = self.on_time_s
         longer = np.where(on > 0, self.effective(valve) / np.where(on > 0, on, 1.0), 0.0)  # R of each step
@@ -147,14 +180,14 @@ class Chain:
         sized = push * np.sqrt(unsure)[:, None, :]
         own = sized @ self.together() @ np.swapaxes(sized, 1, 2) + noise[:, :, None] * np.eye(self.width)
         main = own[1:] + own[:-1] + walk
-        main[~self.used] += 1e12 * np.eye(self.width)
+        main[~self.used] += _NOT_USED * np.eye(self.width)
         return Covariance.of(main, -own[1:-1])
 
 
 def to_come(duty, rate, valve: Valve) -> tuple[np.ndarray, np.ndarray]:
-    """Mean [s] and variance [s2] of the effective time that counters have and the craft has not yet, for a sample at any time.
+    """Mean [s] and variance [s2] of the effective time that is counted but not yet delivered, for a sample at a random time.
 
-    While a pulse lasts that is td + tf - tr exp(-(t - td)/tr), then it runs out with the delay and the fall."""
+    While a pulse lasts that is td + tf - tr exp(-(t - td)/tr); after its end it falls with the delay and the fall time."""
     td, tr, tf = valve.delay_s, valve.rise_s, valve.fall_s
     mean = duty * (tf + td) + rate * (tf**2 + td * tf + td**2 / 2 - tr * (tr + td))
     square = duty * (tf + td) ** 2 + rate * (tf**3 / 2 + td * tf**2 - 2 * (tf + td) * tr**2 + tr**3 / 2)
@@ -162,18 +195,25 @@ def to_come(duty, rate, valve: Valve) -> tuple[np.ndarray, np.ndarray]:
     return mean, np.maximum(square - mean**2, 0.0)
 
 
-def momentum_chain(f: Firings, priors, number: int) -> Chain:
-    """Momentum's steps, with what may be wrong: spin inertia, inertia, gyro bias, number of pulses."""
+def momentum_chain(f: Firings, priors: Priors, number: int) -> Chain:
+    """Steps of the momentum, with their nuisances: spin inertia, inertia, gyro bias."""
     y, t = f.in_space, f.seconds
     halfway = f.turned[:-1] * (f.turned[:-1].inv() * f.turned[1:]) ** 0.5
     nuisances = [
-        Nuisance(f"spin inertia {w.name}", -np.diff(f.turned.apply(h), axis=0), priors.spin_share, True)
+        Nuisance(
+            Parameter(Source.SPIN_INERTIA, w.name),
+            -np.diff(f.turned.apply(h), axis=0),
+            priors.spin_share,
+            considered=True,
+        )
         for w, h in zip(f.subject.craft.wheels, np.swapaxes(f.each, 0, 1), strict=False)
     ]
-    nuisances.append(Nuisance("inertia", -np.diff(f.turned.apply(f.body), axis=0), priors.inertia_share, True))
+    of_body = -np.diff(f.turned.apply(f.body), axis=0)
+    nuisances.append(Nuisance(Parameter(Source.INERTIA), of_body, priors.inertia_share, considered=True))
     if not f.by_quaternion:
         nuisances += [
-            Nuisance(f"rate offset {a} of record {number}", np.diff(np.cross(np.outer(t, e), y), axis=0), priors.gyro_bias_rad_s)
+            Nuisance(Parameter(Source.RATE_OFFSET, f"{a} of record {number}"), np.diff(np.cross(np.outer(t, e), y), axis=0),
+                     priors.gyro_bias_rad_s)
             for a, e in zip("xyz", np.eye(3), strict=True)
         ]  # fmt: skip
     return Chain(

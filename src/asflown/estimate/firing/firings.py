@@ -1,8 +1,8 @@
-"""What thrusters were ordered to do in a record, and the momentum of the craft at instants where that is known.
+"""Commanded firings of a record, and the momentum of the craft at instants where they are known.
 
-On-times come every so often.  Where they do not change, any sample of the momentum will do; where they do, the sample nearest the
-counter's is taken, and firings between the two happened at a time that is not known: they count in proportion to time, with
-the variance of so many pulses placed at random.
+On-times are sampled less often than momentum.  Where they do not change, every sample of the momentum is used.  Where they do,
+the sample nearest to the counter's is used; the time of firings between the two is not known, so they are interpolated
+linearly, with the variance of as many pulses placed at random.
 """
 
 from __future__ import annotations
@@ -11,31 +11,40 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput
-from ...kit.rotations import turned_by
 from ...kit.timeline import NS
-from ..subject import Samples, Subject, at_limit, samples_of, subject_of
+from ..subject import Samples, at_limit, samples_of
 from .branches import CHANNEL, branch_change, branches_in_use, undescribed
-from .counters import Counters, Known, NothingFires, counters_of, step_of
+from .counters import Counters, Known, NothingFires, control_step_s, counters_of, step_of
 from .missed_pulses import PULSES, gained_idle, pulse_Nms, uncounted
 
 if TYPE_CHECKING:
-    from ...craft.model import Craft, Thruster
-    from ...telemetry.telemetry import Telemetry
+    from scipy.spatial.transform import Rotation
 
-#: Pulses a second times this is what a sample soon after some of them counts as not known. [s]
+    from ...craft.model import Thruster
+    from ...telemetry.telemetry import Telemetry
+    from ..subject import Subject
+
+#: Pulses a second times this is added to the variance of a sample, for what they still have to give. [s]
 _TAIL_S = 0.2
-#: While something fires, samples further apart than this are enough: the quietest of each such span is taken. [s]
+#: While thrusters fire, one sample is used in so long: the one at which the firings are known best. [s]
 _ENOUGH_S = 8.0
 #: Share of the cadence within which a spline between samples smears a pulse.
 _SMEARED = 0.25
 
 
+BRANCH_NOT_DESCRIBED = Kind(
+    "firing.branch-not-described", Severity.CAUTION,
+    "{why}: the places and directions described are used, and the thrust is that of branch {branch}",
+    "Describe the branch in use in the craft file.",
+)  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Firings:
-    """One record: momentum at N instants, in axes that do not turn and were the body's at the first, and what had been fired.
+    """One record: momentum at N instants, in inertial axes that were the body's at the first, and what had been fired.
 
     ``each`` (N, n, 3) and ``body`` (N, 3): momentum of wheels and of body, body axes."""
 
@@ -52,7 +61,7 @@ class Firings:
     broken: np.ndarray  # (N - 1,) bool: what was fired, or what was gained, is not known
     at_limit: np.ndarray  # (N,) bool: a wheel may be at its rate limit
     counters: Counters
-    doubts: tuple[str, ...]
+    doubts: Doubts
 
     @property
     def telemetry(self) -> Telemetry:
@@ -74,7 +83,7 @@ class Firings:
 
     @property
     def in_space(self) -> np.ndarray:
-        """The same in axes that do not turn, (N, 3)."""
+        """The same in inertial axes, (N, 3)."""
         return self.turned.apply(self.momentum)
 
     @property
@@ -87,11 +96,11 @@ class Firings:
         return self.counters.pulses[-1]
 
 
-def firings_of(telemetry: Telemetry, craft: Craft, enough_s: float = _ENOUGH_S) -> Firings:
-    """``enough_s``: while something fires, one sample in so long is taken.
+def firings_of(subject: Subject, enough_s: float = _ENOUGH_S) -> Firings:
+    """``enough_s``: while thrusters fire, one sample in so long is used. [s]
 
     Raises BadInput where no thruster fires, one is not the craft's or has no counter, or the momentum is not known."""
-    subject = subject_of(telemetry, craft)
+    telemetry, craft = subject.telemetry, subject.craft.craft
     if subject.relative:
         raise BadInput(
             f"the spin inertia of {craft.name}'s wheels is not known, so a thrust in newtons is not either",
@@ -110,7 +119,7 @@ def firings_of(telemetry: Telemetry, craft: Craft, enough_s: float = _ENOUGH_S) 
             file=telemetry.source or None,
             remedy="The record must reach over at least three samples of the on-times; take a longer one.",
         )
-    turned = _turned(samples)[chosen]
+    turned = samples.turned[chosen]
     tai_ns = samples.tai_ns[chosen]
     broken = np.zeros(len(tai_ns) - 1, bool)
     for k in np.flatnonzero(counters.broken):
@@ -120,7 +129,7 @@ def firings_of(telemetry: Telemetry, craft: Craft, enough_s: float = _ENOUGH_S) 
     if broken.all():
         raise BadInput(
             "no two neighbouring instants have momentum and on-times that are known: "
-            + "; ".join([*of_wheels, *doubts]),
+            + "; ".join(map(str, [*of_wheels, *doubts])),
             file=telemetry.source or None,
             remedy="Take a record, or a span of it, in which counters and wheels stay within their ranges.",
         )
@@ -138,19 +147,19 @@ def firings_of(telemetry: Telemetry, craft: Craft, enough_s: float = _ENOUGH_S) 
         broken=broken,
         at_limit=limited,
         counters=counters,
-        doubts=(*subject.doubts, *samples.doubts, *doubts, *of_wheels, *_one_branch(telemetry, thrusters)),
+        doubts=Doubts([*subject.doubts, *samples.doubts, *doubts, *of_wheels, _one_branch(telemetry, thrusters)]),
     )
 
 
 def _instants(s: Samples, counters: Counters, enough_s: float) -> np.ndarray:
-    """Which samples to use: all where nothing fires, in every other interval of the counters the one best known."""
+    """Samples to use: all where nothing fires, and elsewhere the best known one of each interval of the counters."""
     inside = np.flatnonzero((s.tai_ns >= counters.tai_ns[0]) & (s.tai_ns <= counters.tai_ns[-1]))
     if not len(inside):
         return inside
     tai_ns = s.tai_ns[inside]
     known = counters.at(tai_ns)
     unsure = (known.early + _TAIL_S * known.rate).sum(axis=1)
-    # every sample belongs to the counters' sample nearest to it, or to a span of several
+    # each sample belongs to the counters' sample nearest to it, and those to spans of ``enough_s``
     at = (counters.tai_ns - counters.tai_ns[0]) / NS
     nearest = np.searchsorted(0.5 * (at[1:] + at[:-1]), (tai_ns - counters.tai_ns[0]) / NS)
     nearest = np.floor(at / enough_s)[nearest]
@@ -162,31 +171,23 @@ def _instants(s: Samples, counters: Counters, enough_s: float) -> np.ndarray:
 
 
 def _smeared(known: Known, cadence_s: float) -> Known:
-    """With the pulses that a spline over so long a cadence moves to either side."""
+    """With the variance of pulses that a spline over this cadence moves to an earlier or a later sample."""
     return known._replace(early=known.early + _SMEARED * cadence_s * known.rate)
 
 
-def _turned(s: Samples) -> Rotation:
-    """From the body's axes to ones that do not turn."""
-    if s.attitude is not None:
-        return s.attitude
-    return Rotation.identity(len(s.tai_ns)) if s.rates is None else turned_by(s.seconds, s.rates)
-
-
 def _idle(subject: Subject, why: NothingFires) -> BadInput:
-    """No on-time rises: whether the momentum says otherwise."""
+    """The error to raise where no on-time rises: that of thrusters that fire uncounted, if the momentum shows it."""
     samples = samples_of(subject)
     if samples.rates is None:
         return why
-    craft, turned = subject.craft.craft, _turned(samples)
-    step_s = craft.wheel_controller.period if craft.wheel_controller else 0.125
+    craft, turned = subject.craft.craft, samples.turned
     gained = gained_idle(turned.apply(samples.momentum), turned.apply(samples.body))
-    pulses = gained / pulse_Nms(craft, craft.thrusters, step_s, subject.telemetry.date_ns)
+    pulses = gained / pulse_Nms(craft, craft.thrusters, control_step_s(craft), subject.telemetry.date_ns)
     return uncounted(gained, pulses, "in this record", subject.telemetry.source) if pulses > PULSES else why
 
 
-def _one_branch(tlm: Telemetry, thrusters) -> list[str]:
-    """Doubts about the branch in use; raises BadInput where it changes."""
+def _one_branch(tlm: Telemetry, thrusters) -> Doubt | None:
+    """A doubt about the branch in use; raises BadInput where it changes."""
     if (change := branch_change(tlm)) is not None:
         raise BadInput(
             f"the thrusters' branch changes in this record ({change}), and each branch has a thrust of its own",
@@ -195,6 +196,4 @@ def _one_branch(tlm: Telemetry, thrusters) -> list[str]:
             remedy="Give one record a branch: cut it with --start and --stop.",
         )
     other = undescribed(tlm, thrusters)
-    if other is None:
-        return []
-    return [f"{other}: its places and directions are taken, and the thrust is that of branch {branches_in_use(tlm)[0]}"]
+    return None if other is None else BRANCH_NOT_DESCRIBED(why=other, branch=branches_in_use(tlm)[0])

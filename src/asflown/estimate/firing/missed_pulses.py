@@ -1,4 +1,4 @@
-"""Momentum that comes as from pulses while no on-time rises: thrusters that fire uncounted."""
+"""Momentum that changes as by pulses while no on-time rises: thrusters that fire uncounted."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ if TYPE_CHECKING:
 
     from ...craft.model import Craft, Thruster
 
-#: So many pulses' worth of momentum within one span in which no on-time rises are more than what pulses still owe.
+#: A change of momentum beyond that of so many pulses, within a span in which no on-time rises, is not the tail of earlier pulses.
 PULSES = 4.0
 #: Instants at either end over which momentum is averaged, and share by which the inertia may be off.
 _ENDS, _INERTIA = 3, 0.1
 
 
 def uncounted(gained_Nms: float, pulses: float, when: str, source: str) -> BadInput:
+    """The error to raise; ``when``: such as 'in this record'."""
     return BadInput(
         f"momentum changes by {gained_Nms:.3g} N m s {when}, as by {pulses:.0f} pulses, while no on-time rises: thrusters fire that "
         "are not counted, those of the other branch, or one leaks",
@@ -30,8 +31,8 @@ def uncounted(gained_Nms: float, pulses: float, when: str, source: str) -> BadIn
 
 
 def gained_idle(momentum: np.ndarray, body: np.ndarray) -> float:
-    """Change of momentum (N, 3) from the first instants to the last, in axes that do not turn, beyond what an inertia not quite
-    right makes of the body's own (N, 3). [N m s]"""
+    """Change of momentum (N, 3) from the first instants to the last, in inertial axes, beyond what an error of the inertia can
+    make of the body's own (N, 3). [N m s]"""
 
     def change(v) -> float:
         return float(np.linalg.norm(v[-_ENDS:].mean(axis=0) - v[:_ENDS].mean(axis=0)))
@@ -40,7 +41,7 @@ def gained_idle(momentum: np.ndarray, body: np.ndarray) -> float:
 
 
 def pulse_Nms(craft: Craft, thrusters: Sequence[Thruster], step_s: float, tai_ns: int | None) -> float:
-    """What a pulse of one control step turns the craft by, of the thruster with the longest arm. [N m s]"""
+    """Angular impulse of a pulse of one control step, of the thruster with the longest arm. [N m s]"""
     thrust = craft.believed_thrust(tai_ns)
     arms = np.linalg.norm(
         moment_matrix([t.position for t in thrusters], [t.direction for t in thrusters], craft.likely_center), axis=0

@@ -1,4 +1,4 @@
-"""What is taken as known before a record is looked at, each with its sigma: all of it can be changed."""
+"""Priors of the thrusters and of the craft, each with its sigma; the user can change all of them."""
 
 from __future__ import annotations
 
@@ -7,23 +7,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput
 from ..subject import GYRO_BIAS, INERTIA_SHARE, SPIN_SHARE
 
 if TYPE_CHECKING:
     from ...craft.model import Craft
 
-#: 001 section V: tests gave fall times of 40 to 90 ms, 65 in the mean. [s]
+#: Feldman & Lee, section V: tests gave fall times of 40 to 90 ms, with a mean of 65 ms. [s]
 FALL, FALL_SIGMA = 0.065, 0.013
-#: Across the craft, and along z: assumed.  Where nothing tells the place it is the middle of the thrusters. [m]
+#: Across the craft, and along z: assumed.  Where the centre of mass is not known it is the middle of the thrusters. [m]
 CENTER_SIGMA, CENTER_UNKNOWN = (0.1, 0.1, 0.5), (0.1, 0.1, 2.0)
-#: One sigma from pulse to pulse, as a share; how unlike thrusters are, the scale of a half-normal distribution; mass: assumed.
+#: Assumed shares: one sigma from pulse to pulse; scale of the half-normal prior on the spread of the thrusters; mass.
 PULSE_SCATTER, UNLIKE, MASS_SHARE = 0.02, 0.05, 0.001
 
 
 @dataclass(frozen=True)
 class Priors:
-    """There is none on the thrust itself: it is what is looked for."""
+    """What is known beforehand; there is no prior on the thrust, which is what is estimated.
+
+    ``pulse_scatter``, ``unlike``, ``spin_share``, ``inertia_share``, ``mass_share``: one sigma, as a share."""
 
     fall_s: float
     fall_sigma_s: float
@@ -36,7 +39,7 @@ class Priors:
     gyro_bias_rad_s: float = GYRO_BIAS
     mass_kg: float | None = None
     mass_share: float = MASS_SHARE
-    doubts: tuple[str, ...] = ()
+    doubts: Doubts = Doubts()
 
     def record(self) -> dict:
         return {
@@ -52,21 +55,29 @@ class Priors:
 
     def __str__(self) -> str:
         x, s = self.center_m, self.center_sigma_m
-        middle = ", ".join(f"{a:g} +- {b:g}" for a, b in zip(x, s, strict=True))
+        middle = ", ".join(f"{a:g} ± {b:g}" for a, b in zip(x, s, strict=True))
         mass = "" if self.mass_kg is None else f"; mass {self.mass_kg:g} kg to {100 * self.mass_share:g} %"
         return (
-            f"fall time {1e3 * self.fall_s:g} +- {1e3 * self.fall_sigma_s:g} ms; centre of mass {middle} m; pulses to "
+            f"fall time {1e3 * self.fall_s:g} ± {1e3 * self.fall_sigma_s:g} ms; centre of mass {middle} m; pulses to "
             f"{100 * self.pulse_scatter:g} %, thrusters alike to {100 * self.unlike:g} %; spin inertia to {100 * self.spin_share:g} %, inertia to {100 * self.inertia_share:g} %{mass}"
         )
 
 
-def center_doubts(craft: Craft, sigma_m) -> list[str]:
-    """That the centre of mass is not known, and what is taken; nothing where it is known."""
+CENTER_NOT_KNOWN = Kind(
+    "firing.center-of-mass-not-known", Severity.NOTE,
+    "the centre of mass is not known: {taken}, with a sigma of {sigma} m", "Give --cm.",
+)  # fmt: skip
+
+
+def center_doubts(craft: Craft, sigma_m) -> list[Doubt]:
+    """That the centre of mass is not known, and what is assumed; nothing where it is known."""
     if craft.center_of_mass is not None:
         return []
     meters, place = (", ".join(f"{v:g}" for v in x) for x in (sigma_m, craft.likely_center))
-    where = "the middle of the thrusters is taken" if craft.center_of_mass_assumed is None else f"{place} m is assumed"
-    return [f"the centre of mass is not known: {where}, to {meters} m. Give --cm"]
+    taken = (
+        "the middle of the thrusters is assumed" if craft.center_of_mass_assumed is None else f"{place} m is assumed"
+    )
+    return [CENTER_NOT_KNOWN(taken=taken, sigma=meters)]
 
 
 def priors_for(
@@ -82,29 +93,43 @@ def priors_for(
     mass_kg: float | None = None,
     mass_share: float | None = None,
 ) -> Priors:
-    """Those of a craft, with what the user says instead.  Raises BadInput for a craft without thrusters and for a value that
-    no prior can have."""
+    """Priors of a craft, with what the user says instead.
+
+    Parameters
+    ----------
+    craft : Craft
+        One with thrusters.
+    fall_s, fall_sigma_s : float, optional
+        Fall time of the valves and its sigma [s]; the craft's and 0.013 s unless given.
+    center_sigma_m : array_like of shape (3,), optional
+        Sigma of the centre of mass along each axis [m].
+    pulse_scatter, unlike, spin_share, inertia_share, mass_share : float, optional
+        One sigma, as a share: from pulse to pulse, of one thruster against the others, of a wheel's spin inertia, of the
+        inertia, of the mass.
+    mass_kg : float, optional
+        Mass of the craft, which accelerometer counts need.
+
+    Returns
+    -------
+    Priors
+
+    Raises
+    ------
+    BadInput
+        For a craft without thrusters, and for a value that is out of its range.
+    """
     if not craft.thrusters:
         raise BadInput(f"{craft.name} has no thrusters", remedy="Give its file [[thrusters]], or name another --craft.")
-    for value, what, option in (
-        (fall_s, "fall time", "--fall-time"),
-        (fall_sigma_s, "sigma of the fall time", "--fall-sigma"),
-        (mass_kg, "mass", "--mass"),
-    ):
-        if value is not None and not value > 0:
-            raise BadInput(f"a {what} of {value:g} is not positive", remedy=f"Give {option} a value above zero.")
+    _check_positive({
+        "fall time (--fall-time)": fall_s, "sigma of the fall time (--fall-sigma)": fall_sigma_s, "mass (--mass)": mass_kg,
+    })  # fmt: skip
+    _check_shares({
+        "--unlike": unlike, "--spin-sigma": spin_share, "--inertia-sigma": inertia_share, "--mass-sigma": mass_share,
+    })  # fmt: skip
     if pulse_scatter is not None and not 0 <= pulse_scatter < 1:
         raise BadInput(
-            f"a pulse scatter of {pulse_scatter:g} is no share", remedy="Give a number from 0 to 1: 0.02 is 2 %."
+            f"a pulse scatter of {pulse_scatter:g} is not between 0 and 1", remedy="Give a share: 0.02 is 2 %."
         )
-    for value, option in (
-        (unlike, "--unlike"),
-        (spin_share, "--spin-sigma"),
-        (inertia_share, "--inertia-sigma"),
-        (mass_share, "--mass-sigma"),
-    ):
-        if value is not None and not 0 < value < 1:
-            raise BadInput(f"{option} {value:g} is no share", remedy="Give a number between 0 and 1: 0.02 is 2 %.")
     if center_sigma_m is not None and not min(center_sigma_m) > 0:
         raise BadInput("a sigma of the centre of mass is not positive", remedy="Give three lengths above zero.")
     own = [t.fall for t in craft.thrusters if t.fall > 0]
@@ -120,5 +145,17 @@ def priors_for(
         inertia_share=INERTIA_SHARE if inertia_share is None else inertia_share,
         mass_kg=mass_kg,
         mass_share=MASS_SHARE if mass_share is None else mass_share,
-        doubts=tuple(center_doubts(craft, center_sigma_m)),
+        doubts=Doubts(center_doubts(craft, center_sigma_m)),
     )
+
+
+def _check_positive(values: dict[str, float | None]) -> None:
+    for what, value in values.items():
+        if value is not None and not value > 0:
+            raise BadInput(f"{what} {value:g} is not positive", remedy="Give a value above zero.")
+
+
+def _check_shares(shares: dict[str, float | None]) -> None:
+    for option, value in shares.items():
+        if value is not None and not 0 < value < 1:
+            raise BadInput(f"{option} {value:g} is not between 0 and 1", remedy="Give a share: 0.02 is 2 %.")

@@ -1,8 +1,8 @@
-"""How many pulses made up an on-time, where nobody counted them.
+"""How many pulses made up an on-time, where they are not counted.
 
-A deadband controller fires one control step and waits; 001 has 175 steps in 151 pulses (its simulation) and 243 in 240 (28
-January 2005).  A rise by one step is one pulse.  A larger one may be one long pulse or several: several where samples are
-further apart than pulses are, and then of MEAN_STEPS each.
+A deadband controller fires for one control step and waits; Feldman & Lee have 175 steps in 151 pulses (their simulation) and
+243 in 240 (28 January 2005).  A rise by one step is one pulse.  A larger one may be one long pulse or several: several where
+samples are further apart than pulses are, and then of MEAN_STEPS each.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ _WITHIN = 0.25
 
 @dataclass(frozen=True)
 class Guess:
-    """Pulses in every interval, what one sigma of the mean length changes in their number, and the variance that chance makes in
-    each interval by itself; (M, j) each."""
+    """Pulses in each interval, what one sigma of their mean length changes in their number, and the variance of the number in
+    each interval; (M, j) each."""
 
     pulses: np.ndarray
     spread: np.ndarray
@@ -34,8 +34,7 @@ class Guess:
 def guess_pulses(on_time_s, interval_s, step_s: float) -> Guess:
     """From on-times (M, j) within intervals (M,) [s] of a controller with that step [s].
 
-    Pulses that follow each other closely cannot be more than the steps on, nor than the steps off: in a burn thrusters are on
-    but for short breaks."""
+    There cannot be more pulses than steps on, nor than steps off: in a burn thrusters are on except for short breaks."""
     steps = np.asarray(on_time_s, float) / step_s
     room = np.asarray(interval_s, float)[:, None]
     breaks = np.maximum(room - on_time_s, 0.0) / step_s

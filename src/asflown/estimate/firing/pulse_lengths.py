@@ -1,7 +1,7 @@
-"""How long pulses were, from on-times and numbers of pulses: what scatters from pulse to pulse keeps through one of minutes.
+"""How long pulses were, from on-times and numbers of pulses.  A pulse keeps its error of size while it lasts, even for minutes.
 
-Pulses that begin in one interval of the counters are alike in it; the last of them goes on through intervals in which none
-begins.
+Pulses that begin in one interval of the counters are taken as equally long in it; the last of them goes on through intervals in
+which none begins.
 """
 
 from __future__ import annotations
@@ -11,18 +11,17 @@ from itertools import pairwise
 
 import numpy as np
 
-#: A pulse that goes on through so many intervals of the counters after its own is followed by itself; of a record, so many.
+#: A pulse that lasts for at least so many further intervals of the counters has a parameter of its own; at most so many a record.
 _INTERVALS, _MOST = 2, 60
-
-
-#: A thruster burns where it is on for more than this share of the time, if most of its on-time is so; never off is below this share.
+#: A thruster burns where it is on for more than this share of the time, if that holds for most of its on-time; below the second
+#: share of time off it counts as never off.
 _BURNING, _NEVER_OFF = 0.5, 0.005
 
 
 @dataclass(frozen=True)
 class Lengths:
-    """At the counters' instants (M,).  ``squares`` (M, j): of all pulses' lengths, added up [s2]; ``short``: of those that are not
-    followed one by one.  ``long`` (M, L): on-time so far of each that is [s], and ``thruster`` (L,) it is of."""
+    """At the counters' instants (M,).  ``squares`` (M, j): sum of the squares of all pulses' lengths [s2]; ``short``: the same of
+    pulses that have no parameter of their own.  ``long`` (M, L): on-time so far of each that has one [s]; ``thruster`` (L,): whose."""
 
     squares: np.ndarray
     short: np.ndarray
@@ -60,11 +59,11 @@ def lengths_of(on_time_s, pulses) -> Lengths:
 
 
 def weak_because_lasting(on_time_s, interval_s, scatter: float) -> np.ndarray:
-    """By how much what a thruster gave in a burn may lie below the mean of its pulses, as a share of all it gave, (j,).
+    """Share by which the impulse of a thruster in a burn may lie below the mean of its pulses, (j,).
 
-    From on-times (M, j) in intervals (M,) [s].  A thruster off for a share x of the burn is the stronger one of its pair by x; a pulse
-    stronger by d lasts as 1 / (x + d), so that weighted by length the mean of d is - scatter^2 / x, as long as x is the larger.
-    One that is never off is followed as one pulse."""
+    From on-times (M, j) in intervals (M,) [s].  A thruster off for a share x of the burn is the stronger one of its pair by x.  A
+    pulse stronger by d lasts in proportion to 1 / (x + d), so that the mean of d weighted by length is -scatter^2 / x, for
+    scatter well below x.  A thruster that is never off has one pulse, with a parameter of its own."""
     on, room = np.asarray(on_time_s, float), np.asarray(interval_s, float)[:, None]
     burning = on > _BURNING * room
     burnt, span = (on * burning).sum(axis=0), (room * burning).sum(axis=0)

@@ -1,11 +1,13 @@
 """The disturbance torque of one axis from all channels at once: state-space model, noise levels, prior, evidence."""
 
-from .fuse import CONSIDERED, PRIORS, fused
-from .gather import LOOPS
+from .body import AxisData, hats
+from .fuse import CONSIDERED, LOOP_NOT_USED, PRIORS, Fusion, fused
+from .gather import LOOPS, CannotFuse
+from .innovations import DELAY_OFF, KNOWN_OFF, UNEXPLAINED
 from .peaks import PEAK_REACH_S, excursions, heights
-from .whitening import AxisData, Regression, hats, regression
+from .whitening import Regression, regression
 
 __all__ = [
-    "CONSIDERED", "LOOPS", "PEAK_REACH_S", "PRIORS", "AxisData", "Regression", "excursions", "fused", "hats",
-    "heights", "regression",
+    "CONSIDERED", "DELAY_OFF", "KNOWN_OFF", "LOOPS", "LOOP_NOT_USED", "PEAK_REACH_S", "PRIORS", "UNEXPLAINED", "AxisData",
+    "CannotFuse", "Fusion", "Regression", "excursions", "fused", "hats", "heights", "regression",
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""What the fused method's models share: series at their own times, and a torque as a random process.
+"""What the fused method's models share: one axis of a body, what was measured on it, and a torque as a random process.
 
 A model of one axis is a linear stochastic one whose last two states are the torque and its slope.  All
 torques, momenta and their slopes are held per unit of the axis's moment of inertia, which keeps every
@@ -12,16 +12,14 @@ state of one size.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, ClassVar
+from dataclasses import dataclass, field, fields, replace
+from typing import ClassVar
 
 import numpy as np
 
 from ...kit.ensemble import respond
-from ...kit.smoother import Measurements, Model, Smoothed, discretize
-
-if TYPE_CHECKING:
-    from .series import Times
+from ...kit.smoother import Measurements, Model, Smoothed, discretize, smooth
+from .series import Times, arrange, channel_of, step_of
 
 
 @dataclass(frozen=True)
@@ -75,7 +73,7 @@ class Body:
         """Standard deviation of every state but the torque's two at the first instant."""
         raise NotImplementedError
 
-    def timing_s(self, v) -> float:
+    def timing_s(self, v) -> float:  # noqa: ARG002
         """One sigma of a sample's instant."""
         return 0.0
 
@@ -83,11 +81,11 @@ class Body:
         """Levels to start a fit from, from the series alone."""
         raise NotImplementedError
 
-    def sensitivities(self, v, times: Times, data: Measurements, best: Smoothed) -> dict[str, np.ndarray]:
-        """By what each measurement (M,) changes where a quantity taken as known is off.
+    def sensitivities(self, axis: AxisData, best: Smoothed) -> dict[str, np.ndarray]:
+        """By what each measurement (M,) of an axis of this body changes where a quantity taken as known is off.
 
-        Names are those of torque_fused.CONSIDERED; per share of the quantity, or per second.  ``best``:
-        states smoothed with it as it was given."""
+        Names are those of ``fuse.CONSIDERED``; per share of the quantity, or per second.  ``best``: states smoothed with
+        the quantities as given."""
         raise NotImplementedError
 
     def model(self, v, times: Times, length_s: float, size_Nm) -> Model:
@@ -126,20 +124,82 @@ class Body:
 Known = Callable[[np.ndarray], np.ndarray]
 
 
-def response(body: Body, levels, times: Times, data: Measurements, torque_Nm) -> np.ndarray:
-    """Measurements (M,) or (M, C), without noise, of torques (N,) or (N, C) [N m] that are straight lines between instants."""
-    torque = np.asarray(torque_Nm, float) / body.inertia_kgm2
-    columns = torque[:, None] if torque.ndim == 1 else torque
-    model = body.smooth_model(levels, times)
-    out = respond(body.lines(levels, times), model, data, body.torque, body.slope, columns)
-    return out[:, 0] if torque.ndim == 1 else out
+@dataclass(frozen=True)
+class AxisData:
+    """One axis: its body, levels, and what was measured.
+
+    As the fused method hands it on, levels are fitted, and outliers and the coupling to other axes are taken off.
+    ``columns``: (M, P), what one sigma of each quantity taken as known does to the measurements; ``start_s``: of the pass,
+    from the telemetry's epoch."""
+
+    body: Body
+    levels: Levels
+    times: Times
+    data: Measurements
+    columns: np.ndarray
+    start_s: float = 0.0
+
+    @classmethod
+    def of(cls, body: Body, levels: Levels, series, wanted_s: np.ndarray | None = None) -> AxisData:
+        """Series arranged into one pass; nothing is taken as known."""
+        times, data = arrange(series, wanted_s)
+        return cls(body, levels, times, data, np.empty((len(data.row), 0)))
+
+    @property
+    def time_s(self) -> np.ndarray:
+        """Instants of the pass from the epoch. (N,)"""
+        return self.start_s + self.times.seconds
+
+    @property
+    def measured_s(self) -> np.ndarray:
+        """When each measurement was taken, from the epoch. (M,)"""
+        return self.time_s[step_of(self.data)]
+
+    @property
+    def channel(self) -> np.ndarray:
+        """Row in ROWS of each measurement. (M,)"""
+        return channel_of(self.times, self.data)
+
+    @property
+    def model(self) -> Model:
+        """With the torque of the fitted levels."""
+        return self.body.smooth_model(self.levels, self.times)
+
+    def smooth_torque(self) -> np.ndarray:
+        """Of the fitted levels, at the instants of the pass. (N,) [N m]"""
+        best = smooth(self.model, self.data)
+        return self.body.inertia_kgm2 * best.mean[:, self.body.torque]
+
+    def response(self, torque_Nm) -> np.ndarray:
+        """Measurements (M,) or (M, C), without noise, of torques (N,) or (N, C) [N m], linear between instants."""
+        body, torque = self.body, np.asarray(torque_Nm, float) / self.body.inertia_kgm2
+        columns = torque[:, None] if torque.ndim == 1 else torque
+        lines = body.lines(self.levels, self.times)
+        out = respond(lines, self.model, self.data, body.torque, body.slope, columns)
+        return out[:, 0] if torque.ndim == 1 else out
+
+    def without(self, torque_Nm: np.ndarray) -> AxisData:
+        """The same less what a known torque (N,), at the instants of the pass, does."""
+        return replace(self, data=replace(self.data, value=self.data.value - self.response(torque_Nm)))
+
+    def without_known(self, known: Known | None) -> AxisData:
+        """The same less what a torque known at any time does; None: there is none."""
+        return self if known is None else self.without(known(self.times.seconds))
+
+    def until(self, stop_s: float) -> AxisData:
+        """The same less what was measured later [s from the epoch]."""
+        n = int(np.sum(self.measured_s <= stop_s))  # they are in order of time
+        start, row, value = self.data.start, self.data.row, self.data.value
+        return replace(self, data=Measurements(np.minimum(start, n), row[:n], value[:n]), columns=self.columns[:n])
+
+    def answers(self, nodes_s: np.ndarray) -> np.ndarray:
+        """Measurements (M, C) of torques of 1 N m at each node, falling linearly to zero at the neighbouring nodes."""
+        return self.response(hats(self.time_s, nodes_s))
 
 
-def without_known(body: Body, levels, times: Times, data: Measurements, known: Known | None) -> Measurements:
-    """The measurements less what a known torque does to them."""
-    if known is None:
-        return data
-    return replace(data, value=data.value - response(body, levels, times, data, known(times.seconds)))
+def hats(time_s: np.ndarray, nodes_s: np.ndarray) -> np.ndarray:
+    """Values (N, C) at some instants of piecewise linear functions that are 1 at one of the even nodes, 0 at all others."""
+    return np.maximum(1 - np.abs(np.asarray(time_s)[:, None] - nodes_s) / (nodes_s[1] - nodes_s[0]), 0.0)
 
 
 @dataclass(frozen=True)
@@ -147,10 +207,13 @@ class Posterior:
     """The torque of one axis given its measurements, on the instants of a pass.
 
     ``mean``: (N,) [N m]; ``paths``: (K, N), drawn jointly; ``considered``: (K, P), drawn, of the quantities
-    taken as known, in units of their sigma; ``whitened``: (M,), what prediction leaves, over its sigma."""
+    taken as known, in units of their sigma; ``whitened``: (M,), innovations over their sigma; ``explained``: whether the
+    prior's torques explain the data; ``peak_scale``: by what the sigma of peaks is multiplied (``peaks.peak_scale``)."""
 
     mean: np.ndarray
     paths: np.ndarray
     considered: np.ndarray
     whitened: np.ndarray
-    settings: dict
+    settings: dict = field(default_factory=dict)
+    explained: bool = True
+    peak_scale: float = 1.0

@@ -8,8 +8,8 @@ goes through sets of corners (born, removed, moved, split, merged) with the bend
 
     y = X b + D d + e,   b_i ~ N(0, s^2 / l_i), l_i gamma (Student-t bends),   number of corners: beta-binomial
 
-and through a few sizes of roughness and the smooth torque of the fitted levels, each with its own whitening.  D holds the sensitivities to what is
-taken as known (an inertia, a gain), d ~ N(0, 1) how far off each is.  A pure triangle keeps its corners
+and through a few sizes of roughness and the smooth torque of the fitted levels, each with its own whitening.  D holds the
+sensitivities to what is taken as known (an inertia, a gain), d ~ N(0, 1) how far off each is.  A pure triangle keeps its corners
 sharp, since a straight line costs nothing; a rubbing hinge gets its roughness, since the data ask for it.
 """
 
@@ -23,13 +23,12 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from ...kit.ensemble import Gains, gains, paths, simulate, spread, whiten
-from .body import Body, Levels, Posterior, response
+from .body import AxisData, Posterior
 from .corner_sampler import sample
 from .peaks import excursions, peak_scale
 
 if TYPE_CHECKING:
-    from ...kit.smoother import Measurements
-    from .series import Times
+    from numpy.random import Generator
 
 #: Sizes of the roughness as shares of the torque's own size near that time, and time scales, short of what the telemetry
 #: resolves (studies/corners.py). [1], [s]
@@ -51,9 +50,10 @@ _PROPOSALS, _LEAST_PROPOSALS, _BURN_IN = 50, 30_000, 0.4
 _CHAINS = 4
 #: Innovations whose mean square is above 1 by this many standard errors are not explained. [sigma]
 _UNEXPLAINED = 5.0
-#: Pure lines are as sure as they look: their flights would say 1.0 (0.8 to 1.1, studies/peak_scale.py), and take half as long as all else.
+#: Where pure lines are more probable than this, the peaks' sigma needs no scale (flights give 0.8 to 1.1,
+#: studies/peak_scale.py), and the flights, half of the run time, are left out.
 _SURE_OF_LINES = 0.5
-#: Flights of the model itself that the peaks' sigma is held against; their share of the proposals, and draws of each.
+#: Flights of the model itself that the peaks' sigma is checked against; their share of the proposals, and draws of each.
 _FLIGHTS, _FLOWN_PROPOSALS, _FLOWN_DRAWS = 8, 0.5, 80
 
 
@@ -70,10 +70,14 @@ class _Way:
     columns: np.ndarray  # (M, C)
     gram: np.ndarray  # (C, C)
 
-    @classmethod
-    def of(cls, g: Gains, seen: np.ndarray, begin: np.ndarray) -> _Way:
-        X = whiten(g, seen, begin)
-        return cls(g, X, X.T @ X)
+
+@dataclass(frozen=True)
+class _Walked:
+    """Draws from the sampler: coefficients (K, C), numbers of corners (K,), and the way of each (K,)."""
+
+    bends: np.ndarray
+    corners: np.ndarray
+    which: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -82,19 +86,48 @@ class _Search:
 
     Columns are the line's two, those of what is taken as known, and a bend at every candidate."""
 
-    body: Body
-    times: Times
+    axis: AxisData
     basis: np.ndarray  # (N, 2 + candidates), torque of a unit of each [N m]
     seen: np.ndarray  # (M, C), what of it is measured
+    begin: np.ndarray  # (C,), the instant before which each column is zero
     always: np.ndarray  # prior sigma of the columns that are in every set
     bend_variance: float
     corner_prior: np.ndarray
     proposals: int
-    rng: np.random.Generator
+    rng: Generator
+
+    @classmethod
+    def of(cls, axis: AxisData, rng: Generator) -> _Search:
+        times, levels, columns = axis.times, axis.levels, axis.columns
+        wanted = times.seconds[times.wanted]
+        step = float(wanted[1] - wanted[0])
+        candidates = wanted[:: round(spacing_s(np.ptp(wanted), step) / step)]
+        t = times.seconds[:, None]
+        basis = np.hstack([np.ones_like(t), t - t[0], np.maximum(t - candidates, 0.0)])
+        lines = axis.response(basis)
+        known = columns.shape[1]
+        slope = levels.torque_Nm * math.sqrt(3) / levels.length_s
+        return cls(
+            axis,
+            basis,
+            np.hstack([lines[:, :2], columns, lines[:, 2:]]),
+            np.concatenate([np.zeros(2 + known, int), np.searchsorted(times.seconds, candidates)]),
+            np.array([levels.torque_Nm, slope, *np.ones(known)]),
+            slope**2,
+            np.array([_CORNER_PRIOR[0], _CORNER_PRIOR[1] / float(candidates[1] - candidates[0])]),
+            max(_LEAST_PROPOSALS, _PROPOSALS * len(candidates)),
+            rng,
+        )
 
     @property
     def fixed(self) -> int:
         return len(self.always)
+
+    def way(self, size_Nm, length_s: float) -> _Way:
+        """The way of a roughness of that size (one, or (N,)) and length."""
+        g = gains(self.axis.body.model(self.axis.levels, self.axis.times, length_s, size_Nm), self.axis.data)
+        X = whiten(g, self.seen, self.begin)
+        return _Way(g, X, X.T @ X)
 
     def lines(self, coefficients: np.ndarray) -> np.ndarray:
         """Torques (K, N) of coefficients (K, C), without roughness."""
@@ -110,118 +143,103 @@ class _Search:
         count: int,
         effort=1.0,
         level=0,
-    ):
-        """Coefficients (K, C), numbers of corners and roughness of ``count`` draws; ``own``: data whitened in each way (M,)."""
+    ) -> _Walked:
+        """``count`` draws; ``own``: data whitened in each way (M,); ``start``, ``level``: corners and way to start from."""
         b = np.array([w.columns.T @ o for w, o in zip(ways, own, strict=True)])
         proposals = int(effort * self.proposals)
-        return sample(
+        return _Walked(*sample(
             np.array([w.gram for w in ways]), b, np.array(evidence), np.log(prior), self.always, self.bend_variance, self.corner_prior, BEND_FREEDOM,
             proposals, int(_BURN_IN * proposals), count, start, level, self.rng,
-        )  # fmt: skip
+        ))  # fmt: skip
 
-    def torques(self, ways: list[_Way], value: np.ndarray, coefficients: np.ndarray, which: np.ndarray) -> np.ndarray:
+    def torques(self, ways: list[_Way], value: np.ndarray, drawn: _Walked) -> np.ndarray:
         """Torques (K, N) of draws given the measurements (M,), their roughness drawn too."""
-        torque = self.lines(coefficients)
-        residual = value[:, None] - self.seen @ coefficients.T
+        body, torque = self.axis.body, self.lines(drawn.bends)
+        residual = value[:, None] - self.seen @ drawn.bends.T
         for k in range(1, len(ways)):
-            mine = which == k
+            mine = drawn.which == k
             if mine.any():
-                added = paths(ways[k].gains, residual[:, mine], [self.body.torque], self.rng)[:, :, 0]
-                torque[mine] += self.body.inertia_kgm2 * added
+                added = paths(ways[k].gains, residual[:, mine], [body.torque], self.rng)[:, :, 0]
+                torque[mine] += body.inertia_kgm2 * added
         return torque
 
 
-def draw_torques(
-    body: Body,
-    levels: Levels,
-    times: Times,
-    data: Measurements,
-    columns: np.ndarray,
-    count: int,
-    rng: np.random.Generator,
-) -> Posterior:
-    """The posterior of corners, bends and roughness at fixed ``levels``; ``columns``: (M, P), of one sigma each.
+def draw_torques(axis: AxisData, count: int, rng: Generator) -> Posterior:
+    """The posterior of corners, bends and roughness at the axis's levels.
 
-    A sampler that has not found what explains the data as well as a smooth torque does is given ten
-    times longer; whether it did in the end stands in ``settings['explained']``."""
-    wanted = times.seconds[times.wanted]
-    every = round(spacing_s(np.ptp(wanted), float(wanted[1] - wanted[0])) / (wanted[1] - wanted[0]))
-    candidates = wanted[::every]
-    t = times.seconds[:, None]
-    basis = np.hstack([np.ones_like(t), t - t[0], np.maximum(t - candidates, 0.0)])
-    lines = response(body, levels, times, data, basis)
-    seen = np.hstack([lines[:, :2], columns, lines[:, 2:]])
-    fixed = 2 + columns.shape[1]
-    begin = np.concatenate([np.zeros(fixed, int), np.searchsorted(times.seconds, candidates)])
-    slope = levels.torque_Nm * math.sqrt(3) / levels.length_s
-    search = _Search(
-        body, times, basis, seen, np.array([levels.torque_Nm, slope, *np.ones(columns.shape[1])]), slope**2,
-        np.array([_CORNER_PRIOR[0], _CORNER_PRIOR[1] / float(candidates[1] - candidates[0])]),
-        max(_LEAST_PROPOSALS, _PROPOSALS * len(candidates)), rng,
-    )  # fmt: skip
-
-    def way(size_Nm, length_s: float) -> _Way:
-        return _Way.of(gains(body.model(levels, times, length_s, size_Nm), data), seen, begin)
-
-    plain = way(np.zeros(len(t)), ROUGHNESS[0][1])
-    first, _, _ = search.walk(
-        [plain], np.ones(1), [plain.gains.own], [plain.gains.log_likelihood], np.empty(0, np.int64), count
-    )
-    found = fixed + np.flatnonzero(first[-1, fixed:])
-    square = np.mean(search.lines(first) ** 2, axis=0)
-    size = np.sqrt(gaussian_filter1d(square, _NEARBY_S / _step(times), mode="nearest"))
-    ways = [plain, *[way(r * size, s) for r, s in ROUGHNESS], way(levels.torque_Nm, levels.length_s)]
-    own, evidence = [w.gains.own for w in ways], [w.gains.log_likelihood for w in ways]
-    for effort in (1, 10):
-        drawn = [search.walk(ways, _PRIOR, own, evidence, found, -(-count // _CHAINS), effort) for _ in range(_CHAINS)]
-        bends, corners, which = (np.concatenate(x)[:count] for x in zip(*drawn, strict=True))
-        usual = int(np.bincount(which).argmax())
-        left = own[usual] - ways[usual].columns @ bends[which == usual].mean(axis=0)
-        explained = np.mean(left**2) < 1 + _UNEXPLAINED * math.sqrt(2 / len(left))
-        if explained:
-            break
-    torque = search.torques(ways, data.value, bends, which)
-    mean, as_lines = torque.mean(axis=0), float(np.mean(which == 0))
+    Where the first draws do not explain the data as well as a smooth torque does, the sampler is given ten times as many
+    proposals; ``Posterior.explained`` says whether they did in the end."""
+    search = _Search.of(axis, rng)
+    ways, found = _ways(search, count)
+    drawn, left, explained = _walked(search, ways, found, count)
+    torque = search.torques(ways, axis.data.value, drawn)
+    mean, as_lines, scale = torque.mean(axis=0), float(np.mean(drawn.which == 0)), 1.0
     settings = {
-        "corners": float(corners.mean()),
+        "corners": float(drawn.corners.mean()),
         "lines_probability": as_lines,
-        "smooth_probability": float(np.mean(which == len(ways) - 1)),
-        "explained": bool(explained),
+        "smooth_probability": float(np.mean(drawn.which == len(ways) - 1)),
+        "explained": explained,
     }
     if explained and as_lines < _SURE_OF_LINES:
-        shown = times.wanted
+        shown = axis.times.wanted
         peaks = excursions(mean[shown], spread(torque[:, shown]))
         if len(peaks):
-            true, flown = _flown_again(search, ways, levels, data, bends, which, torque)
-            settings["peak_scale"] = peak_scale(times.seconds[shown], mean[shown], peaks, true, flown)
-    return Posterior(mean, torque, bends[:, 2:fixed], left, settings)
+            true, flown = _flown_again(search, ways, drawn, torque)
+            scale = settings["peak_scale"] = peak_scale(axis.times.seconds[shown], mean[shown], peaks, true, flown)
+    considered = drawn.bends[:, 2 : search.fixed]
+    return Posterior(mean, torque, considered, left, settings, explained, scale)
 
 
-def _flown_again(search: _Search, ways: list[_Way], levels: Levels, data: Measurements, bends, which, torque):
+def _ways(search: _Search, count: int) -> tuple[list[_Way], np.ndarray]:
+    """Pure lines, three sizes of roughness and the smooth torque; and the corners that pure lines need."""
+    levels, times = search.axis.levels, search.axis.times
+    plain = search.way(np.zeros(len(times.seconds)), ROUGHNESS[0][1])
+    first = search.walk(
+        [plain], np.ones(1), [plain.gains.own], [plain.gains.log_likelihood], np.empty(0, np.int64), count
+    ).bends
+    square = np.mean(search.lines(first) ** 2, axis=0)
+    # the instants are nearly even, and the neighbourhood need not be exact
+    size = np.sqrt(gaussian_filter1d(square, _NEARBY_S / float(np.mean(np.diff(times.seconds))), mode="nearest"))
+    ways = [
+        plain,
+        *[search.way(r * size, s) for r, s in ROUGHNESS],
+        search.way(levels.torque_Nm, levels.length_s),
+    ]
+    return ways, search.fixed + np.flatnonzero(first[-1, search.fixed :])
+
+
+def _walked(search: _Search, ways: list[_Way], found: np.ndarray, count: int) -> tuple[_Walked, np.ndarray, bool]:
+    """Draws of all chains, innovations (M,) of the most frequent way, and whether these are as small as they should be."""
+    own, evidence = [w.gains.own for w in ways], [w.gains.log_likelihood for w in ways]
+    for effort in (1, 10):
+        chains = [search.walk(ways, _PRIOR, own, evidence, found, -(-count // _CHAINS), effort) for _ in range(_CHAINS)]
+        drawn = _Walked(
+            *(np.concatenate(x)[:count] for x in zip(*((c.bends, c.corners, c.which) for c in chains), strict=True))
+        )
+        usual = int(np.bincount(drawn.which).argmax())
+        left = own[usual] - ways[usual].columns @ drawn.bends[drawn.which == usual].mean(axis=0)
+        explained = bool(np.mean(left**2) < 1 + _UNEXPLAINED * math.sqrt(2 / len(left)))
+        if explained:
+            break
+    return drawn, left, explained
+
+
+def _flown_again(search: _Search, ways: list[_Way], drawn: _Walked, torque) -> tuple[np.ndarray, np.ndarray]:
     """Some of the drawn torques (F, N wanted), and what is made of each from telemetry the model itself would give of it (F, K, N wanted)."""
-    body, times, rng, fixed = search.body, search.times, search.rng, search.fixed
+    axis, rng, fixed = search.axis, search.rng, search.fixed
     chosen = rng.choice(len(torque), _FLIGHTS, replace=False)
-    quiet = simulate(ways[0].gains.model, data, [body.torque], _FLIGHTS, rng)[1]  # of no torque at all: noise
-    value = (
-        response(body, levels, times, data, torque[chosen].T)
-        + search.seen[:, 2:fixed] @ bends[chosen, 2:fixed].T
-        + quiet
-    )
+    quiet = simulate(ways[0].gains.model, axis.data, [axis.body.torque], _FLIGHTS, rng)[1]  # of no torque at all: noise
+    value = axis.response(torque[chosen].T) + search.seen[:, 2:fixed] @ drawn.bends[chosen, 2:fixed].T + quiet
     own = [whiten(w.gains, value) for w in ways]
-    wanted, flown = times.wanted, []
+    wanted, flown = axis.times.wanted, []
     for k, j in enumerate(chosen):
         evidence = [
             w.gains.log_likelihood + 0.5 * (w.gains.own @ w.gains.own - o[:, k] @ o[:, k])
             for w, o in zip(ways, own, strict=True)
         ]
-        start = fixed + np.flatnonzero(bends[j, fixed:])
-        again, _, rough = search.walk(
-            ways, _PRIOR, [o[:, k] for o in own], evidence, start, _FLOWN_DRAWS, _FLOWN_PROPOSALS, which[j]
+        start = fixed + np.flatnonzero(drawn.bends[j, fixed:])
+        again = search.walk(
+            ways, _PRIOR, [o[:, k] for o in own], evidence, start, _FLOWN_DRAWS, _FLOWN_PROPOSALS, drawn.which[j]
         )
-        flown.append(search.torques(ways, value[:, k], again, rough)[:, wanted])
+        flown.append(search.torques(ways, value[:, k], again)[:, wanted])
     return torque[chosen][:, wanted], np.array(flown)
-
-
-def _step(times: Times) -> float:
-    """Mean step: the instants are nearly even, and the neighbourhood need not be exact."""
-    return float(np.mean(np.diff(times.seconds)))

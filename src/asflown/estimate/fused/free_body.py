@@ -22,10 +22,11 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from .body import Body, Levels
-from .series import BODY_RATE, CONTROL_TORQUE, MOMENTUM, ROWS, Times, channel_of, step_of, usual_size, white_noise
+from .series import BODY_RATE, CONTROL_TORQUE, MOMENTUM, ROWS, Times, step_of, usual_size, white_noise
 
 if TYPE_CHECKING:
-    from ...kit.smoother import Measurements, Smoothed
+    from ...kit.smoother import Smoothed
+    from .body import AxisData
 
 _RATE, _STORED, _FREE, _FREE_SLOPE, _ANGLE, _HELD, _ERROR, _TORQUE, _STATES = 0, 1, 2, 3, 4, 5, 6, 7, 9
 
@@ -81,17 +82,17 @@ class FreeBody(Body):
         Q[_ERROR, _ERROR] = 2 * v.rate_slow_rad_s**2 / v.rate_time_s
         return F, Q
 
-    def sensitivities(self, v: FreeLevels, times: Times, data: Measurements, best: Smoothed) -> dict[str, np.ndarray]:
-        """All motion answers to another inertia, not the disturbance's part alone; so do the actuators' readings to their scale."""
-        at = best.mean[step_of(data)]
+    def sensitivities(self, axis: AxisData, best: Smoothed) -> dict[str, np.ndarray]:
+        """Another inertia changes all motion, not the disturbance's part alone; another scale changes all actuators' readings."""
+        at = best.mean[step_of(axis.data)]
 
         def on(row: int, values) -> np.ndarray:
-            return np.where(channel_of(times, data) == row, values, 0.0)
+            return np.where(axis.channel == row, values, 0.0)
 
         return {
             "inertia": on(BODY_RATE, -at[:, _RATE]),
             "spin_inertia": on(MOMENTUM, self.inertia_kgm2 * at[:, _STORED]),
-            "control_torque": on(CONTROL_TORQUE, self.inertia_kgm2 * at @ self.control(v)),
+            "control_torque": on(CONTROL_TORQUE, self.inertia_kgm2 * at @ self.control(axis.levels)),  # type: ignore[arg-type]
         }
 
     def measured(self, v: FreeLevels) -> tuple[np.ndarray, np.ndarray]:

@@ -1,13 +1,13 @@
 """Disturbance torque from all channels at once: one smoothing of the loop with a torque in it.
 
 Wheels, body rates and attitude error each see the torque through the same closed loop.  A model of one axis
-(``latent_loop`` where the controller is known, ``latent_free`` where it is not) holds that loop, the slow error
+(``held_body`` where the controller is known, ``free_body`` where it is not) holds that loop, the slow error
 of the attitude estimate, and the torque as a random process; sizes, times and noise levels are those of
 largest marginal likelihood (``levels``).  Nothing is splined or differenced, a missing sample is a missing
 update, and a gap only widens the band.
 
 What the torque may be is a prior: ``edges``, straight lines between corners with a roughness where the data
-ask for one (``corners``); ``matern`` or ``wiener``, a Gaussian process (``curves``).  What is taken as known
+need one (``corners``); ``matern`` or ``wiener``, a Gaussian process (``smooth_torque``).  What is taken as known
 (inertia, gains, spin inertia) is off by an unknown amount, which the band contains, and which the data narrow where
 the controller is known.
 
@@ -21,51 +21,94 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
+from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.ensemble import spread
 from ...kit.errors import BadInput
-from ...kit.smoother import Measurements, smooth
+from ...kit.smoother import smooth
 from ...telemetry.channels import AXES
-from ..subject import Grid, Subject
-from .body import Body, without_known
+from ..subject import INERTIA_SHARE, SPIN_SHARE, Grid, Subject
+from .body import AxisData, Body, Known
 from .corners import COARSEST_S, draw_torques, spacing_s
 from .free_body import FreeBody
-from .gather import Record, gather
+from .gather import CannotFuse, Record, gather, needed
 from .held_body import HeldBody
 from .innovations import Innovations, by_channel, considered_doubts, innovation_doubts
 from .levels import AxisFit, fit_doubts, fit_levels
-from .series import Times, arrange, channel_of
 from .smooth_torque import gaussian_torque, widened
-from .whitening import AxisData
 
 PRIORS = ("edges", "matern", "wiener")
 
-#: One-sigma uncertainty of what is taken as known: shares, and the loop's delay in seconds.  Tensors estimated in
-#: flight differ from the ground's by 0.2 to 1.3 % (001 Table 1, Ixx and Iyy), wheels' by their rounding; gains are
-#: software constants, what delivers them is not; a digital loop is late by up to a cycle of 0.125 s.
-CONSIDERED = {"inertia": 0.01, "spin_inertia": 0.0025, "kp": 0.005, "kd": 0.005, "delay_s": 0.1, "control_torque": 0.01}
+#: One-sigma uncertainty of what is taken as known: shares, and the loop's delay in seconds.  Gains are software constants, what
+#: delivers them is not; a digital loop is late by up to a cycle of 0.125 s.
+CONSIDERED = {
+    "inertia": INERTIA_SHARE, "spin_inertia": SPIN_SHARE, "kp": 0.005, "kd": 0.005, "delay_s": 0.1, "control_torque": 0.01,
+}  # fmt: skip
 
 #: Torques drawn from the posterior.
 PATHS = 400
 _SEED = 20160913
 
+TOO_LONG_FOR_CORNERS = Kind(
+    "fused.too-long-for-corners", Severity.NOTE,
+    "the record of {duration_s:.0f} s is too long to look for corners in: a smooth torque is taken, which rounds sharp peaks",
+    "Narrow the window with --start and --stop.",
+)  # fmt: skip
+NOT_ALL_AXES = Kind(
+    "fused.gyroscopic-not-taken-off", Severity.CAUTION,
+    "w x H and the products of inertia are not taken off, since not all axes have body rates: they are in the torque",
+    "Add body_rate_x, _y and _z.",
+)  # fmt: skip
+LOOP_NOT_USED = Kind(
+    "fused.loop-not-used", Severity.SUSPECT,
+    "the loop as the craft file describes it is not used, and the actuators' action is taken as measured: that loop does not "
+    "explain {channel} about {axis} (correlation of the innovations {correlation:+.2f})",
+    "Check inertia and gains, and whether the span holds a commanded motion or a thruster firing.",
+)  # fmt: skip
+CORNERS_DO_NOT_EXPLAIN = Kind(
+    "fused.corners-do-not-explain", Severity.CAUTION,
+    "straight lines between corners do not explain the torque about {axis}: a smooth torque is taken instead",
+)  # fmt: skip
+
 
 @dataclass(frozen=True)
-class Solved:
-    """One axis: its fit, the torque's posterior on the grid (paths (K, M)), and what prediction leaves."""
+class Fusion:
+    """The torque by the fused method, body axes; NaN for axes not asked for.
 
-    fit: AxisFit
+    ``torque_Nm``, ``sigma_Nm``, ``momentum_Nms``: (M, 3), on the grid; ``paths_Nm``: (K, F, 3), drawn jointly, on the grid or
+    one twice as fine.  By axis: ``peak_scales``, by what the spread of drawn peaks is to be multiplied, and ``evidence``.
+    ``unexplained``: the doubts about channels that the model does not explain; they are among the doubts."""
+
+    grid: Grid
+    torque_Nm: np.ndarray
+    sigma_Nm: np.ndarray
+    momentum_Nms: np.ndarray
+    paths_Nm: np.ndarray
+    peak_scales: dict[str, float]
+    evidence: dict[str, AxisData]
+    loop: str
+    unexplained: Doubts
+    settings: dict
+    doubts: Doubts
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """One axis: the torque's posterior at the wanted instants (paths (K, F)), and innovations."""
+
     mean: np.ndarray
     paths: np.ndarray
+    peak_scale: float
     considered: dict[str, tuple[float, float]]  # share off, mean and sigma
     innovations: dict[str, Innovations]
+    unexplained: list[Doubt]
     settings: dict
-    doubts: list[str]
+    doubts: list[Doubt]
     data: AxisData
 
 
 @dataclass(frozen=True)
-class Motion:
-    """What the craft does, on the grid, (M, 3), from all axes' smoothed states."""
+class _Motion:
+    """The craft's motion on the grid, (M, 3), from all axes' smoothed states."""
 
     rate: np.ndarray
     rate_variance: np.ndarray
@@ -73,81 +116,107 @@ class Motion:
     stored_Nms: np.ndarray
 
 
+@dataclass(frozen=True)
+class _Coupling:
+    """What a model of one axis leaves out, on the grid, (M, 3): w x H and the products of inertia's torque.
+
+    ``variance``: of w x H, by the rates' uncertainty; that of H does not matter."""
+
+    torque_Nm: np.ndarray
+    variance: np.ndarray
+    momentum_Nms: np.ndarray
+
+    @classmethod
+    def of(cls, motion: _Motion, I_B: np.ndarray, *, whole: bool) -> _Coupling:
+        """``whole``: all axes' motion is known; else no torque is taken off."""
+        H = motion.rate @ I_B + motion.stored_Nms
+        torque = np.zeros_like(H)
+        if whole:
+            torque = motion.acceleration @ (I_B - np.diag(np.diag(I_B))) + np.cross(motion.rate, H)
+        return cls(torque, motion.rate_variance @ (np.mean(H**2, axis=0) * (1 - np.eye(3))), H)
+
+    def known(self, grid: Grid, j: int) -> Known | None:
+        """The torque about an axis that has to be taken off first; None for none."""
+        column = self.torque_Nm[:, j]
+        return (lambda t: -np.interp(t, grid.seconds, column)) if np.any(column) else None
+
+
 def fused(
     subject: Subject,
-    prior: str | None = None,
     axes: tuple[int, ...] = (0, 1, 2),
+    *,
+    prior: str | None = None,
     loop: str | None = None,
     considered: dict[str, float] | None = None,
     seed: int = _SEED,
-):
-    """Returns grid, torque (M, 3), sigma, momentum, settings, doubts, paths (K, M, 3), axis -> AxisData; NaN for axes not asked for.
+) -> Fusion:
+    """The torque about some axes.
 
     ``prior``: one of PRIORS, or None: edges, but matern in a record too long for it.  ``loop``: one of
-    records.LOOPS, or None: modelled where it can be.  ``considered``: in place of some of CONSIDERED.
+    ``gather.LOOPS``, or None: modelled where that is possible and explains the data no worse than measured.
+    ``considered``: sigmas in place of some of CONSIDERED.
 
-    Raises BadInput where body rates, actuators or inertia are missing, for edges in a record of more than 100
-    minutes (at 1 s), and what ``records.gather`` raises."""
-    known = CONSIDERED | (considered or {})
-    I_B = subject.known_inertia()
-    record = gather(subject, axes, loop)
-    doubts = list(record.doubts)
-    too_long = _too_long_for_corners(record.grid)
-    if prior == "edges" and too_long:
-        raise BadInput(too_long, remedy="Narrow it with --start and --stop, or use --prior matern.")
-    if prior is None:
-        prior = "matern" if too_long else "edges"
-        doubts += [f"{too_long}: a smooth torque is taken, which rounds sharp ones"] if too_long else []
-    bodies = {j: _body(subject, record, I_B[j, j], prior == "wiener") for j in record.series}
+    Raises CannotFuse where body rates, actuators or inertia are missing and what ``gather`` raises, BadInput for edges in a
+    record of more than 100 minutes (at 1 s)."""
+    with needed():
+        subject.known_inertia()
+    sizes = CONSIDERED | (considered or {})
+    found = _fused(subject, gather(subject, axes, loop), axes, prior, sizes, seed)
+    if loop is not None or found.loop == "measured" or not found.unexplained:
+        return found
+    other = _fused(subject, gather(subject, axes, "measured"), axes, prior, sizes, seed)
+    if len(other.unexplained) >= len(found.unexplained):
+        return found
+    first = found.unexplained[0]
+    return replace(other, doubts=Doubts([LOOP_NOT_USED(**first.about, **first.numbers), *other.doubts]))
+
+
+def _fused(
+    subject: Subject, record: Record, axes, prior: str | None, considered: dict[str, float], seed: int
+) -> Fusion:
+    I_B, grid = subject.known_inertia(), record.grid
+    prior, too_long = _prior_for(grid, prior)
+    bodies = {j: _body(subject, record, I_B[j, j], wiener=prior == "wiener") for j in record.series}
     fits = {j: fit_levels(bodies[j], record.series[j]) for j in bodies}
-    motion = _motion(bodies, fits, record)
-    H = motion.rate @ I_B + motion.stored_Nms
-    coupling = np.zeros_like(H)
-    if len(bodies) == 3:
-        products = I_B - np.diag(np.diag(I_B))
-        coupling = motion.acceleration @ products + np.cross(motion.rate, H)
+    motion, whole = _motion(bodies, fits, record), len(bodies) == 3
+    coupling = _Coupling.of(motion, I_B, whole=whole)
+    if whole and not record.together:
         fits = _carried(subject, axes, record, motion, fits)
-    else:
-        doubts.append(
-            "w x H and the products of inertia are not taken off, since not all axes have body rates: they are in the torque"
-        )
-    # of w x H: the size of H is what matters
-    turning = motion.rate_variance @ (np.mean(H**2, axis=0) * (1 - np.eye(3)))
     seeds = np.random.default_rng(seed).spawn(3)
-    torque, sigma, momentum = np.full((3, record.grid.count, 3), np.nan)
-    fine = _finer(record.grid, prior)
-    paths = np.full((PATHS, fine.count, 3), np.nan)
+    fine = _finer(grid, prior)
     solved = {}
     for j in axes:
-        s = _solve(bodies[j], fits[j], fine, record.grid, coupling[:, j], prior, known, AXES[j], seeds[j])
-        solved[AXES[j]] = s
-        every = (fine.count - 1) // (record.grid.count - 1)
-        own = spread(s.paths[:, ::every])
-        torque[:, j], sigma[:, j] = s.mean[::every], np.sqrt(own**2 + turning[:, j])
-        wider = np.interp(fine.seconds, record.grid.seconds, sigma[:, j] / own)
-        paths[:, :, j] = s.mean + (s.paths - s.mean) * wider
-        momentum[:, j] = H[:, j]
-        doubts += s.doubts
-    unexplained = [d for a, s in solved.items() for d in innovation_doubts(a, s.innovations)]
-    if unexplained and loop is None and record.loop == "modelled":
-        *answer, other_settings, others, drawn, data = fused(subject, prior, axes, "measured", considered, seed)
-        if other_settings["unexplained_channels"] < len(unexplained):
-            instead = f"the loop as the craft file describes it is not used, the actuators' action is taken as measured: {unexplained[0]}"
-            return (*answer, other_settings, [instead, *others], drawn, data)
+        axis = AxisData.of(bodies[j], fits[j].levels, fits[j].series, fine.seconds)
+        solved[j] = _solve(axis, coupling.known(grid, j), prior, considered, AXES[j], seeds[j])
+    torque, sigma, momentum, paths = _columns_of(solved, grid, fine, coupling)
+    unexplained = Doubts(d for s in solved.values() for d in s.unexplained)
+    found = [too_long, None if whole else NOT_ALL_AXES()]
+    for j, s in solved.items():
+        found += [*fit_doubts(AXES[j], fits[j]), *s.doubts]
+    start_s = float(grid.from_epoch(subject.telemetry)[0])
     settings = {
-        "prior": prior, "loop": record.loop, "seed": seed, "unexplained_channels": len(unexplained), **_settings(solved)
+        "prior": prior, "loop": record.loop, "seed": seed, "unexplained_channels": len(unexplained),
+        **_settings({AXES[j]: (fits[j], s) for j, s in solved.items()}),
     }  # fmt: skip
-    start_s = float(record.grid.from_epoch(subject.telemetry)[0])
-    data = {a: replace(s.data, start_s=start_s) for a, s in solved.items()}
-    return record.grid, torque, sigma, momentum, settings, doubts, paths, data
+    return Fusion(
+        grid, torque, sigma, momentum, paths,
+        {AXES[j]: s.peak_scale for j, s in solved.items()},
+        {AXES[j]: replace(s.data, start_s=start_s) for j, s in solved.items()},
+        record.loop, unexplained, settings, record.doubts + found,
+    )  # fmt: skip
 
 
-def _too_long_for_corners(grid: Grid) -> str:
-    """What there is against looking for corners; '' where there is nothing."""
+def _prior_for(grid: Grid, prior: str | None) -> tuple[str, Doubt | None]:
+    """The prior to take; the doubt that the default would be another in a shorter record."""
     duration = float(grid.seconds[-1])
     if spacing_s(duration, grid.step_s) <= max(COARSEST_S, grid.step_s):
-        return ""
-    return f"the record of {duration:.0f} s is too long to look for corners in"
+        return prior or "edges", None
+    if prior == "edges":
+        raise BadInput(
+            f"the record of {duration:.0f} s is too long to look for corners in",
+            remedy="Narrow it with --start and --stop, or use --prior matern.",
+        )
+    return prior or "matern", None if prior else TOO_LONG_FOR_CORNERS(duration_s=duration)
 
 
 def _finer(grid: Grid, prior: str) -> Grid:
@@ -157,42 +226,39 @@ def _finer(grid: Grid, prior: str) -> Grid:
     return Grid(grid.start_ns, grid.step_s / 2, 2 * grid.count - 1)
 
 
-def _body(subject: Subject, record: Record, inertia_kgm2: float, wiener: bool) -> Body:
+def _body(subject: Subject, record: Record, inertia_kgm2: float, *, wiener: bool) -> Body:
     if record.loop == "modelled":
         return HeldBody.under(subject.controller(), inertia_kgm2, wiener=wiener)
     return FreeBody(inertia_kgm2=inertia_kgm2, wiener=wiener)
 
 
-def _motion(bodies: dict[int, Body], fits: dict[int, AxisFit], record: Record) -> Motion:
+def _motion(bodies: dict[int, Body], fits: dict[int, AxisFit], record: Record) -> _Motion:
     """From one smoothing of each axis under its fitted levels."""
     rate, variance, acceleration, stored = np.zeros((4, record.grid.count, 3))
     for j, body in bodies.items():
-        times, data = arrange(fits[j].series, record.grid.seconds)
-        best = smooth(body.smooth_model(fits[j].levels, times), data)
-        x = best.mean[times.wanted]
-        F, _ = body.dynamics(fits[j].levels)
+        axis = AxisData.of(body, fits[j].levels, fits[j].series, record.grid.seconds)
+        best, wanted = smooth(axis.model, axis.data), axis.times.wanted
+        x = best.mean[wanted]
+        F, _ = body.dynamics(axis.levels)
         F[body.torque, body.slope] = 1
         rate[:, j], acceleration[:, j] = x[:, body.RATE], x @ F[body.RATE]
-        variance[:, j] = best.covariance[times.wanted, body.RATE, body.RATE]
+        variance[:, j] = best.covariance[wanted, body.RATE, body.RATE]
         if not record.pushed:
             stored[:, j] = record.start_Nms[j] + body.inertia_kgm2 * x[:, body.STORED]
-    sound = np.isfinite(rate).all() and np.isfinite(acceleration).all() and variance.min() >= 0
-    if not sound:
-        raise _lost()
-    return Motion(rate, variance, acceleration, stored)
+    if not (np.isfinite(rate).all() and np.isfinite(acceleration).all() and variance.min() >= 0):
+        raise _not_fitted()
+    return _Motion(rate, variance, acceleration, stored)
 
 
-def _lost() -> BadInput:
-    return BadInput(
-        "the model cannot be fitted to this record: its covariance lost its meaning",
+def _not_fitted() -> CannotFuse:
+    return CannotFuse(
+        "the model cannot be fitted to this record: its covariance is not positive or not finite",
         remedy="Look for values of impossible size (asflown telemetry check), or use --method momentum.",
     )
 
 
-def _carried(subject: Subject, axes, record: Record, motion: Motion, fits):
+def _carried(subject: Subject, axes, record: Record, motion: _Motion, fits: dict[int, AxisFit]) -> dict[int, AxisFit]:
     """The fits with the momentum of unsynchronised wheels read anew, each sample carried by the motion."""
-    if record.together:
-        return fits
     at = record.grid.seconds
 
     def stored(t):
@@ -205,66 +271,65 @@ def _carried(subject: Subject, axes, record: Record, motion: Motion, fits):
 
 
 def _solve(
-    body: Body,
-    fit: AxisFit,
-    fine: Grid,
-    grid: Grid,
-    coupling: np.ndarray,
-    prior: str,
-    considered: dict[str, float],
-    axis: str,
-    rng,
-) -> Solved:
-    """The torque of one axis at the ``fine`` instants; ``coupling`` (M,), at those of ``grid``, is taken off first."""
-    times, whole = arrange(fit.series, fine.seconds)
-
-    def known(t):
-        return -np.interp(t, grid.seconds, coupling)
-
-    data = without_known(body, fit.levels, times, whole, known if np.any(coupling) else None)
-    names, columns = _columns(body, fit, times, whole, considered)
-    learnt = columns if body.NARROWS else columns[:, :0]
-    doubts = fit_doubts(axis, fit)
-    post = None
-    if prior == "edges":
-        post = draw_torques(body, fit.levels, times, data, learnt, PATHS, rng)
-        if not post.settings["explained"]:
-            post = None
-            doubts.append(
-                f"straight lines between corners do not explain the torque about {axis}: a smooth torque is taken in their place"
-            )
+    whole: AxisData, known: Known | None, prior: str, considered: dict[str, float], name: str, rng: np.random.Generator
+) -> _Solved:
+    """The torque of one axis at the wanted instants; ``known``: a torque to take off first."""
+    sizes, columns = _sensitivities(whole, considered)
+    axis = whole.without_known(known)
+    learnt = replace(axis, columns=columns if axis.body.NARROWS else columns[:, :0])
+    doubts: list[Doubt] = []
+    post = draw_torques(learnt, PATHS, rng) if prior == "edges" else None
+    if post is not None and not post.explained:
+        post = None
+        doubts.append(CORNERS_DO_NOT_EXPLAIN(axis=name))
     if post is None:
-        post = gaussian_torque(body, fit.levels, times, data, learnt, PATHS, rng)
-    if not body.NARROWS:
-        post = widened(post, body, fit.levels, times, data, columns, rng)
+        post = gaussian_torque(learnt, PATHS, rng)
+    if not axis.body.NARROWS:
+        post = widened(post, replace(axis, columns=columns), rng)
     if not (np.isfinite(post.paths).all() and np.isfinite(post.mean).all()):
-        raise _lost()
-    innovations = by_channel(post.whitened, channel_of(times, data))
-    shares = {n: considered[n] for n in names}
+        raise _not_fitted()
+    innovations = by_channel(post.whitened, axis.channel)
     off = {
-        n: (s * float(c.mean()), s * float(c.std()))
-        for (n, s), c in zip(shares.items(), post.considered.T, strict=True)
+        n: (s * float(c.mean()), s * float(c.std())) for (n, s), c in zip(sizes.items(), post.considered.T, strict=True)
     }
-    doubts += innovation_doubts(axis, innovations) + considered_doubts(axis, shares, post.considered)
-    wanted = times.wanted
-    kept = AxisData(body, fit.levels, times, data, learnt, 0.0)
-    return Solved(fit, post.mean[wanted], post.paths[:, wanted], off, innovations, post.settings, doubts, kept)
+    unexplained = innovation_doubts(name, innovations)
+    doubts += unexplained + considered_doubts(name, sizes, post.considered)
+    wanted = axis.times.wanted
+    return _Solved(
+        post.mean[wanted], post.paths[:, wanted], post.peak_scale, off, innovations, unexplained, post.settings, doubts, learnt
+    )  # fmt: skip
 
 
-def _columns(body: Body, fit: AxisFit, times: Times, data: Measurements, considered: dict[str, float]):
-    """Names and sensitivities (M, P), each of one sigma, of what is taken as known and moves these measurements."""
-    best = smooth(body.smooth_model(fit.levels, times), data)
-    found = body.sensitivities(fit.levels, times, data, best)
+def _sensitivities(axis: AxisData, considered: dict[str, float]) -> tuple[dict[str, float], np.ndarray]:
+    """Sigmas by name, and sensitivities (M, P) of one sigma each, of what is taken as known and moves these measurements."""
+    found = axis.body.sensitivities(axis, smooth(axis.model, axis.data))
     names = [n for n, column in found.items() if considered[n] > 0 and np.any(column)]
-    return names, np.column_stack([considered[n] * found[n] for n in names] or [np.empty((len(data.row), 0))])
+    columns = np.column_stack([considered[n] * found[n] for n in names] or [axis.columns])
+    return {n: considered[n] for n in names}, columns
 
 
-def _settings(solved: dict[str, Solved]) -> dict:
+def _columns_of(solved: dict[int, _Solved], grid: Grid, fine: Grid, coupling: _Coupling):
+    """Torque, sigma, momentum (M, 3) and paths (K, F, 3), the uncertainty of w x H included; NaN for other axes."""
+    torque, sigma, momentum = np.full((3, grid.count, 3), np.nan)
+    paths = np.full((PATHS, fine.count, 3), np.nan)
+    every = (fine.count - 1) // (grid.count - 1)
+    for j, s in solved.items():
+        own = spread(s.paths[:, ::every])
+        torque[:, j], sigma[:, j] = s.mean[::every], np.sqrt(own**2 + coupling.variance[:, j])
+        wider = np.interp(fine.seconds, grid.seconds, sigma[:, j] / own)
+        paths[:, :, j] = s.mean + (s.paths - s.mean) * wider
+        momentum[:, j] = coupling.momentum_Nms[:, j]
+    return torque, sigma, momentum, paths
+
+
+def _settings(solved: dict[str, tuple[AxisFit, _Solved]]) -> dict:
     return {
-        "levels": {a: asdict(s.fit.levels) for a, s in solved.items()},
-        "left_out": {a: s.fit.left_out for a, s in solved.items()},
-        "time_offsets": {a: {n: asdict(o) for n, o in s.fit.offsets.items()} for a, s in solved.items()},
-        "considered": {a: {n: {"off": m, "sigma": e} for n, (m, e) in s.considered.items()} for a, s in solved.items()},
-        "innovations": {a: {n: asdict(i) for n, i in s.innovations.items()} for a, s in solved.items()},
-        "torque": {a: s.settings for a, s in solved.items() if s.settings},
+        "levels": {a: asdict(f.levels) for a, (f, _) in solved.items()},
+        "left_out": {a: f.left_out for a, (f, _) in solved.items()},
+        "time_offsets": {a: {n: asdict(o) for n, o in f.offsets.items()} for a, (f, _) in solved.items()},
+        "considered": {
+            a: {n: {"off": m, "sigma": e} for n, (m, e) in s.considered.items()} for a, (_, s) in solved.items()
+        },
+        "innovations": {a: {n: asdict(i) for n, i in s.innovations.items()} for a, (_, s) in solved.items()},
+        "torque": {a: s.settings for a, (_, s) in solved.items() if s.settings},
     }

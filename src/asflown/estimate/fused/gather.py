@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput, some_of
 from ...kit.timeline import NS
 from ...telemetry.channels import AXES
-from ..subject import (
-    GAPS_BRIDGED,
-    Grid,
-    Subject,
-    actuators,
-    gap_doubts,
-    gaps_on_grid,
-    grid_for,
-    slews,
-    splined,
-    thrusters_firing,
-)
+from ..subject import GAPS_BRIDGED, Grid, Subject, actuators, gap_doubts, gaps_on_grid, grid_for, splined
 from .series import ATTITUDE_ERROR, BODY_RATE, CONTROL_TORQUE, MOMENTUM, Series
 
 if TYPE_CHECKING:
@@ -34,14 +25,38 @@ LOOPS = ("modelled", "measured")
 _LEAST, _LONGEST = 25, 200_000
 
 #: Momentum of the actuators in body axes (N, 3) at given instants.
-Motion = Callable[[np.ndarray], np.ndarray]
+Stored = Callable[[np.ndarray], np.ndarray]
+
+LOOP_MEASURED = Kind(
+    "fused.loop-measured", Severity.NOTE,
+    "{why}: the actuators' action is taken as measured, which makes a wider band", "{remedy}",
+)  # fmt: skip
+WHEELS_CARRIED = Kind(
+    "fused.wheels-carried", Severity.NOTE,
+    "the wheels are sampled at different instants: the model carries their rates to those of the first",
+)  # fmt: skip
+
+
+class CannotFuse(BadInput):
+    """The record lacks what the fused method needs, or cannot be fitted; another method may do."""
+
+
+@contextmanager
+def needed() -> Iterator[None]:
+    """For what only the fused method needs: a complaint about it becomes ``CannotFuse``."""
+    try:
+        yield
+    except BadInput as why:
+        raise CannotFuse(
+            why.what, remedy=why.remedy, file=why.file, channel=why.channel, time=why.time, line=why.line
+        ) from why
 
 
 @dataclass(frozen=True)
 class Record:
     """The series of every axis that can be solved, seconds from the grid's start.
 
-    ``loop``: whether the controller is modelled, or what the actuators do only measured; ``pushed``: they are
+    ``loop``: whether the controller is modelled, or the actuators' action only measured; ``pushed``: they are
     known by their torque, not their momentum; ``start_Nms``: their momentum (3,), taken off the series;
     ``together``: whether all actuators are read at the same instants."""
 
@@ -51,93 +66,100 @@ class Record:
     series: dict[int, list[Series]]
     start_Nms: np.ndarray
     together: bool
-    doubts: list[str]
+    doubts: Doubts
 
 
-def gather(subject: Subject, axes: tuple[int, ...], loop: str | None, motion: Motion | None = None) -> Record:
+def gather(
+    subject: Subject, axes: tuple[int, ...], loop: str | None = None, stored_Nms: Stored | None = None
+) -> Record:
     """All axes where their channels are there, else those asked for.
 
-    ``loop``: one of LOOPS, or None: modelled where everything that takes is there.  ``motion``: the actuators'
-    momentum as known so far, which carries the samples of wheels read at different instants to common ones.
+    ``loop``: one of LOOPS, or None: modelled where that is possible.  ``stored_Nms``: the actuators' momentum as known so
+    far, which carries the samples of wheels read at different instants to common ones.
 
-    Raises BadInput where a channel is missing, silent or short, and for a loop that cannot be modelled."""
+    Raises CannotFuse where a channel is missing, silent or short, BadInput for a loop that cannot be modelled."""
     tlm = subject.telemetry
-    stored, pushed, doubts = actuators(subject)
-    doubts = list(doubts)
+    stored, pushed, found = _actuators(subject)
     if tlm.has_axes("body_rate"):
         axes = (0, 1, 2)
-    why_not = _loop_unknown(subject, axes, bool(pushed))
-    if loop == "modelled" and why_not:
-        what, remedy = why_not
-        raise BadInput(what, file=tlm.source or None, remedy=remedy)
-    if loop is None and why_not:
-        doubts.append(f"{why_not[0]}: what the actuators do is taken as measured, which makes a wider band")
-    modelled = loop != "measured" and not why_not
-    rows = [(BODY_RATE, "body_rate")]
-    if modelled:
-        rows.insert(0, (ATTITUDE_ERROR, "attitude_error"))
+    loop, not_modelled = _loop(subject, axes, loop, pushed=bool(pushed))
+    rows = [(ATTITUDE_ERROR, "attitude_error")] if loop == "modelled" else []
+    rows += [(BODY_RATE, "body_rate"), *([(CONTROL_TORQUE, "control_torque")] if pushed else [])]
+    with needed():
+        channels = {(row, j): tlm.channel(f"{stem}_{AXES[j]}") for row, stem in rows for j in axes}
+        everything = [*channels.values(), *[c for c, _ in stored]]
+        grid = grid_for(everything)
+    _check(grid, everything)
+    series = {j: [_series(row, c, grid) for (row, i), c in channels.items() if i == j] for j in axes}
+    momentum = _momentum(stored, grid, stored_Nms)
+    for j, of_axis in momentum.series().items():
+        if j in series:
+            series[j].append(of_axis)
+    if loop == "measured":  # where wheels stick and tear loose, the jitter of sampling instants matters
+        series = {j: [s.with_jumps() for s in of_axis] for j, of_axis in series.items()}
+    silent = {g: c.name for c in everything for g in gaps_on_grid(c, grid)}
+    carried = None if momentum.together or stored_Nms is not None else WHEELS_CARRIED()
+    doubts = Doubts([*found, not_modelled, carried, *gap_doubts(tlm, grid, silent, GAPS_BRIDGED)])
+    return Record(grid, loop, bool(pushed), series, momentum.start, momentum.together, doubts)
+
+
+def _actuators(subject: Subject):
+    """As ``actuators``; that the record says nothing of them is no fault of the record."""
+    tlm = subject.telemetry
+    if tlm.members("wheel_rate") or tlm.has_axes("wheel_momentum") or tlm.has_axes("control_torque"):
+        return actuators(subject)
+    with needed():
+        return actuators(subject)
+
+
+def _loop(subject: Subject, axes, loop: str | None, *, pushed: bool) -> tuple[str, Doubt | None]:
+    """Which of LOOPS to take, and the doubt where it could not be chosen freely."""
+    why_not = _loop_unknown(subject, axes, pushed=pushed)
+    if loop == "measured" or why_not is None:
+        return loop or "modelled", None
+    what, remedy = why_not
+    if loop == "modelled":
+        raise BadInput(what, file=subject.telemetry.source or None, remedy=f"{remedy}, or use --loop measured.")
+    return "measured", LOOP_MEASURED(why=what, remedy=f"{remedy}.")
+
+
+def _loop_unknown(subject: Subject, axes, *, pushed: bool) -> tuple[str, str] | None:
+    """Why the closed loop cannot be modelled, and what to do about it."""
+    tlm = subject.telemetry
     if pushed:
-        rows.append((CONTROL_TORQUE, "control_torque"))
-    channels = {(row, j): tlm.channel(f"{stem}_{AXES[j]}") for row, stem in rows for j in axes}
-    everything = [*channels.values(), *[c for c, _ in stored]]
-    grid = grid_for(everything)
+        return "only the actuators' torque is in the telemetry", "Add wheel rates or wheel momentum"
+    if subject.relative:
+        return "wheels of unknown spin inertia are in the telemetry", "Give spin_inertia in the craft file"
+    if subject.craft.craft.wheel_controller is None:
+        what = f"{subject.craft.craft.name} has no wheel controller described"
+        return what, "Describe it under [wheel_controller] in the craft file"
+    missing = [f"attitude_error_{AXES[j]}" for j in axes if f"attitude_error_{AXES[j]}" not in tlm]
+    if missing:
+        return f"{some_of(missing)} is not in the telemetry", "Add the channel"
+    if subject.slewing:
+        what = "the craft slews, and the loop's commanded motion is not in the telemetry"
+        return what, "Narrow the window to a hold with --start and --stop"
+    if subject.firing:
+        return "thrusters fire, and may hold the attitude in place of the wheels", "Narrow the window to a span without"
+    return None
+
+
+def _check(grid: Grid, everything: list[Channel]) -> None:
+    """Raises CannotFuse for a grid too long for one pass, and for channels that hold too little."""
     if grid.count > _LONGEST:
-        raise BadInput(
+        raise CannotFuse(
             f"{grid.count:,} instants are too many for one fused pass",
             remedy=f"Take at most {_LONGEST:,} with --start and --stop, or use --method momentum.",
         )
     for c in everything:
-        _check_alive(c)
-    series: dict[int, list[Series]] = {j: [] for j in axes}
-    for (row, j), c in channels.items():
-        series[j].append(_series(row, c, grid))
-    start, together = np.zeros(3), True
-    if stored:
-        t, h, together = _momentum(stored, grid, doubts, motion)
-        start = h[0].copy()
-        count = np.sqrt(sum((c.count_size * d) ** 2 for c, d in stored))  # of the sum: quanta add as variances do
-        for j in axes:
-            series[j].append(Series(MOMENTUM, t, h[:, j] - start[j], float(count[j])))
-    if not modelled:  # where wheels stick and tear loose, instants within the cadence begin to matter
-        series = {j: [s.with_jumps() for s in of_axis] for j, of_axis in series.items()}
-    silent = {g: c.name for c in everything for g in gaps_on_grid(c, grid)}
-    doubts += gap_doubts(tlm, grid, silent, GAPS_BRIDGED)
-    return Record(grid, "modelled" if modelled else "measured", bool(pushed), series, start, together, doubts)
-
-
-def _loop_unknown(subject: Subject, axes, pushed: bool) -> tuple[str, str] | None:
-    """Why the closed loop cannot be modelled, and what to do about it."""
-    tlm = subject.telemetry
-    if pushed or subject.relative:
-        kind = "only the actuators' torque is" if pushed else "wheels of unknown spin inertia are"
-        return f"{kind} in the telemetry", "Use --loop measured."
-    if subject.craft.craft.wheel_controller is None:
-        return (
-            f"{subject.craft.craft.name} has no wheel controller described",
-            "Describe it under [wheel_controller] in the craft file, or use --loop measured.",
-        )
-    missing = [f"attitude_error_{AXES[j]}" for j in axes if f"attitude_error_{AXES[j]}" not in tlm]
-    if missing:
-        return f"{some_of(missing)} is not in the telemetry", "Add the channel, or use --loop measured."
-    if slews(tlm):
-        return (
-            "the craft slews, and the loop's commanded motion is not in the telemetry",
-            "Narrow the window to a hold with --start and --stop, or use --loop measured.",
-        )
-    if thrusters_firing(tlm):
-        return "thrusters fire, and may hold the attitude in place of the wheels", "Use --loop measured."
-    return None
-
-
-def _check_alive(c: Channel) -> None:
-    u = c.usable.values
-    if len(u) < _LEAST or np.ptp(u) == 0:
-        why = "never changes" if len(u) >= _LEAST else f"has {len(u)} usable samples, fewer than {_LEAST}"
-        raise BadInput(
-            f"this channel {why}: the fused method cannot fit its noise",
-            channel=c.name,
-            remedy="Take a longer window, or use --method momentum.",
-        )
+        u = c.usable.values
+        if len(u) < _LEAST or np.ptp(u) == 0:
+            why = "never changes" if len(u) >= _LEAST else f"has {len(u)} usable samples, fewer than {_LEAST}"
+            raise CannotFuse(
+                f"this channel {why}: the fused method cannot fit its noise",
+                channel=c.name,
+                remedy="Take a longer window, or use --method momentum.",
+            )
 
 
 def _series(row: int, channel: Channel, grid: Grid) -> Series:
@@ -147,8 +169,32 @@ def _series(row: int, channel: Channel, grid: Grid) -> Series:
     return Series(row, s[inside], u.values[inside], u.count_size)
 
 
-def _momentum(stored, grid: Grid, doubts: list[str], motion: Motion | None):
-    """Stored momentum in body axes at the sample times all actuators share, or at those of the first; and whether they share them."""
+@dataclass(frozen=True)
+class _Momentum:
+    """Stored momentum (N, 3) in body axes at instants (N,) from the grid's start; its smallest steps (3,)."""
+
+    seconds: np.ndarray
+    values_Nms: np.ndarray
+    quantum_Nms: np.ndarray
+    together: bool = True
+
+    @property
+    def start(self) -> np.ndarray:
+        return self.values_Nms[0].copy() if len(self.values_Nms) else np.zeros(3)
+
+    def series(self) -> dict[int, Series]:
+        """Of every axis, less the start; none where the actuators' momentum is not told."""
+        if not len(self.seconds):
+            return {}
+        changed = self.values_Nms - self.start
+        return {j: Series(MOMENTUM, self.seconds, changed[:, j], float(self.quantum_Nms[j])) for j in range(3)}
+
+
+def _momentum(stored, grid: Grid, known: Stored | None) -> _Momentum:
+    """At the sample times all actuators share, or at those of the first."""
+    if not stored:
+        return _Momentum(np.zeros(0), np.zeros((0, 3)), np.zeros(3))
+    quantum = np.sqrt(sum((c.count_size * d) ** 2 for c, d in stored))  # of the sum: quanta add as variances do
     lead = stored[0][0].usable
     common = lead.tai_ns
     for c, _ in stored[1:]:
@@ -160,22 +206,19 @@ def _momentum(stored, grid: Grid, doubts: list[str], motion: Motion | None):
         for c, direction in stored:
             u = c.usable
             h += np.outer(u.values[np.searchsorted(u.tai_ns, common)], direction)
-        return grid.of(common), h, True
+        return _Momentum(grid.of(common), h, quantum)
     times = grid.of(lead.tai_ns)
     times = times[(times >= 0) & (times <= grid.seconds[-1])]
-    if motion is None:
-        doubts.append(
-            "the wheels are sampled at different instants: the model carries their rates to those of the first"
-        )
+    if known is None:
         fine = Grid(grid.start_ns, 0.125, int(grid.seconds[-1] * 8) + 1)
         h = np.sum([np.outer(np.interp(times, fine.seconds, splined(c, fine)), d) for c, d in stored], axis=0)
     else:
-        h = _carried(stored, grid, times, motion)
-    known = np.isfinite(h).all(axis=1)
-    return times[known], h[known], False
+        h = _carried(stored, grid, times, known)
+    sound = np.isfinite(h).all(axis=1)
+    return _Momentum(times[sound], h[sound], quantum, together=False)
 
 
-def _carried(stored, grid: Grid, times: np.ndarray, motion: Motion) -> np.ndarray:
+def _carried(stored, grid: Grid, times: np.ndarray, known: Stored) -> np.ndarray:
     """Each wheel's nearest sample, moved by what the momentum known so far makes of the time between."""
     share = np.linalg.pinv(np.array([d for _, d in stored]).T)  # rate of each wheel per momentum
     h = np.zeros((len(times), 3))
@@ -184,7 +227,7 @@ def _carried(stored, grid: Grid, times: np.ndarray, motion: Motion) -> np.ndarra
         t = grid.of(u.tai_ns)
         right = np.clip(np.searchsorted(t, times), 1, len(t) - 1)
         nearest = np.where(times - t[right - 1] < t[right] - times, right - 1, right)
-        moved = (motion(times) - motion(t[nearest])) @ row
+        moved = (known(times) - known(t[nearest])) @ row
         moved[np.abs(t[nearest] - times) > 1.5 * u.cadence_ns / NS] = np.nan
         h += np.outer(u.values[nearest] + moved, direction)
     return h

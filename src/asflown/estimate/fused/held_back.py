@@ -13,17 +13,14 @@ the errors are (X' X)^-1 X' W y: the conditional of a Gaussian, read off its inv
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg
 
 from ...kit.ensemble import gains, whiten
+from .body import AxisData, Body, Levels
 from .levels import fit_levels
-from .series import ROWS, Series, arrange, channel_of, step_of
-
-if TYPE_CHECKING:
-    from .body import Body, Levels
+from .series import ROWS, Series, arrange, step_of
 
 #: Length of a block held back, and how many blocks apart those held back at the same time are. [s]
 BLOCK_S, APART = 60.0, 4
@@ -33,7 +30,7 @@ BLOCK_S, APART = 60.0, 4
 class HeldBack:
     """Held-back samples of one axis in order of time: what was measured, over how sure it was beforehand."""
 
-    row: np.ndarray  # (n,), latent.ROWS
+    row: np.ndarray  # (n,), in series.ROWS
     seconds: np.ndarray  # (n,)
     pull: np.ndarray  # (n,), given the rest
     whitened: np.ndarray  # (n,), given the rest and the held-back samples before it
@@ -41,20 +38,21 @@ class HeldBack:
 
 def predict(body: Body, levels: Levels, series: list[Series], held: list[np.ndarray]) -> HeldBack:
     """Predict the samples where ``held``, (N,) bool for each series, from all others, at given ``levels``."""
-    times, data = arrange(series)
+    axis = AxisData.of(body, levels, series)
+    data = axis.data
     # carried through the same sorting as the values are
     _, marked = arrange([replace(s, values=h.astype(float)) for s, h in zip(series, held, strict=True)])
     which = np.flatnonzero(marked.value)[::-1]  # latest first: the Cholesky factor takes the last column first
     step = step_of(data)[which]
     columns = np.zeros((len(data.row), len(which)))
     columns[which, np.arange(len(which))] = 1
-    g = gains(body.smooth_model(levels, times), data)
+    g = gains(axis.model, data)
     X = whiten(g, columns)
     L = linalg.cholesky(X.T @ X, lower=True)
     white = linalg.solve_triangular(L, X.T @ g.own, lower=True)
     root = linalg.solve_triangular(L, np.eye(len(which)), lower=True)  # covariance = root' root
     error, sigma = root.T @ white, np.sqrt(np.sum(root**2, axis=0))
-    return HeldBack(channel_of(times, data)[which][::-1], times.seconds[step][::-1], (error / sigma)[::-1], white[::-1])
+    return HeldBack(axis.channel[which][::-1], axis.time_s[step][::-1], (error / sigma)[::-1], white[::-1])
 
 
 def hold_back(body: Body, series: list[Series], held: list[np.ndarray], levels: Levels | None = None) -> HeldBack:

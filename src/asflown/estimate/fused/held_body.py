@@ -19,12 +19,13 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from .body import Body, Levels, response
-from .series import ATTITUDE_ERROR, BODY_RATE, MOMENTUM, ROWS, Times, channel_of, usual_size, white_noise
+from .body import Body, Levels
+from .series import ATTITUDE_ERROR, BODY_RATE, MOMENTUM, ROWS, Times, usual_size, white_noise
 
 if TYPE_CHECKING:
     from ...craft.model import WheelController
-    from ...kit.smoother import Measurements, Smoothed
+    from ...kit.smoother import Smoothed
+    from .body import AxisData
 
 _ATTITUDE, _RATE, _FILTER, _STORED, _ERROR, _TORQUE, _STATES = 0, 1, 2, 6, 7, 8, 10
 
@@ -86,18 +87,18 @@ class HeldBody(Body):
         Q += (v.reaction_Nm_sqrt_s / self.inertia_kgm2) ** 2 * np.outer(spread, spread)
         return F, Q
 
-    def sensitivities(self, v: LoopLevels, times: Times, data: Measurements, best: Smoothed) -> dict[str, np.ndarray]:
-        """The torque's own answer under other numbers; per unit inertia the loop has the craft's own gains."""
+    def sensitivities(self, axis: AxisData, best: Smoothed) -> dict[str, np.ndarray]:
+        """The response to the torque under other numbers; per unit inertia the loop has the craft's own gains."""
         torque = self.inertia_kgm2 * best.mean[:, _TORQUE]
-        here = response(self, v, times, data, torque)
-        stored = channel_of(times, data) == MOMENTUM
+        here = axis.response(torque)
+        stored = axis.channel == MOMENTUM
         changes = {
             "kp": (0.01, replace(self, kp_per_s=1.01 * self.kp_per_s)),
             "kd": (0.01, replace(self, kd_per_s=1.01 * self.kd_per_s)),
             "delay_s": (0.05, replace(self, delay_s=0.05)),
         }
         found = {
-            name: (response(other, v, times, data, torque) - here) / step for name, (step, other) in changes.items()
+            name: (replace(axis, body=other).response(torque) - here) / step for name, (step, other) in changes.items()
         }
         return found | {"inertia": np.where(stored, 0.0, -here), "spin_inertia": np.where(stored, here, 0.0)}
 

@@ -1,4 +1,4 @@
-"""What prediction leaves of each channel: white and of unit size where the model holds."""
+"""Innovations of each channel, measured less predicted over their sigma: white and of unit size where the model holds."""
 
 from __future__ import annotations
 
@@ -7,12 +7,28 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from ...kit.doubts import Doubt, Kind, Severity
 from .series import ROWS
 
 #: A channel is not explained when neighbours correlate this much, and chance would do so this rarely.
 _CORRELATED, _CHANCE = 0.35, 1e-3
 #: A quantity taken as known is doubted when the data put it this far off, in units of its own sigma.
 _FAR_OFF = 2.5
+
+UNEXPLAINED = Kind(
+    "fused.unexplained", Severity.SUSPECT,
+    "the model does not explain {channel} about {axis}: its innovations are correlated ({correlation:+.2f})",
+    "Check inertia and gains, and whether the span holds a commanded motion or a thruster firing.",
+)  # fmt: skip
+KNOWN_OFF = Kind(
+    "fused.known-off", Severity.SUSPECT,
+    "the data about {axis} put {quantity} {off_percent:+.1f} ± {sigma_percent:.1f} % off the value given",
+    "Check the craft file, or give --consider {name} a larger sigma.",
+)  # fmt: skip
+DELAY_OFF = Kind(
+    "fused.delay-off", Severity.SUSPECT, "the data about {axis} put {quantity} {off_s:+.2f} ± {sigma_s:.2f} s off",
+    "Check the time stamps, or give --consider {name} a larger sigma.",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -41,17 +57,17 @@ def by_channel(whitened: np.ndarray, row: np.ndarray) -> dict[str, Innovations]:
     return {name: Innovations.of(v) for name, v in channels.items() if len(v) > 20}
 
 
-def innovation_doubts(axis: str, found: dict[str, Innovations]) -> list[str]:
+def innovation_doubts(axis: str, found: dict[str, Innovations]) -> list[Doubt]:
+    """Channels whose innovations are correlated: the model does not explain them."""
     return [
-        f"the model does not explain {channel} about {axis} (its innovations follow each other, correlation "
-        f"{i.correlation:+.2f}): inertia, gains, a commanded motion or a thruster firing in the span?"
+        UNEXPLAINED(channel=channel, axis=axis, correlation=i.correlation)
         for channel, i in found.items()
         if abs(i.correlation) > _CORRELATED and i.p < _CHANCE
     ]
 
 
 _NAMES = {
-    "inertia": "inertia",
+    "inertia": "the inertia",
     "spin_inertia": "the wheels' spin inertia",
     "kp": "the controller's KP",
     "kd": "the controller's KD",
@@ -60,16 +76,16 @@ _NAMES = {
 }
 
 
-def considered_doubts(axis: str, considered: dict[str, float], drawn: np.ndarray) -> list[str]:
+def considered_doubts(axis: str, considered: dict[str, float], drawn: np.ndarray) -> list[Doubt]:
     """Where the data contradict what was taken as known; ``drawn``: (K, P), in units of each one's sigma."""
     doubts = []
     for (name, sigma), column in zip(considered.items(), drawn.T, strict=True):
         mean, spread = float(column.mean()), float(column.std())
         if abs(mean) < _FAR_OFF or spread > 0.8:
             continue
+        told = {"axis": axis, "quantity": _NAMES[name], "name": name}
         if name == "delay_s":
-            size = f"{sigma * mean:+.2f} +- {sigma * spread:.2f} s off"
+            doubts.append(DELAY_OFF(off_s=sigma * mean, sigma_s=sigma * spread, **told))
         else:
-            size = f"{100 * sigma * mean:+.1f} +- {100 * sigma * spread:.1f} % off what was given"
-        doubts.append(f"the data about {axis} want {_NAMES[name]} {size}")
+            doubts.append(KNOWN_OFF(off_percent=100 * sigma * mean, sigma_percent=100 * sigma * spread, **told))
     return doubts

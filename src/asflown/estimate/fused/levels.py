@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize
 
-from ...kit.smoother import Measurements, log_likelihood, smooth
-from .body import Body, Known, Levels, without_known
-from .series import ROWS, Series, Times, arrange, channel_of, step_of
+from ...kit.doubts import Doubt, Kind, Severity
+from ...kit.smoother import log_likelihood, smooth
+from .body import AxisData, Body, Known, Levels
+from .series import ROWS, Series, step_of
 
 #: A sample that all the others contradict by more than this is left out; the most that may be. [sigma]
 OUTLYING, _MOST_OUTLYING = 5.0, 0.1
@@ -25,6 +26,16 @@ _SURE, _WORTH_S = 4.0, 0.2
 _REACH_S = 3.0
 #: Samples of a long record that the levels are fitted to, in blocks spread evenly over it.
 _MOST_FITTED, _BLOCKS = 9000, 3
+
+TIMES_SHIFTED = Kind(
+    "fused.times-shifted", Severity.CAUTION,
+    "{channel} about {axis} is {shift_s:.2f} ± {sigma_s:.2f} s {side} against the actuators' telemetry: its times are shifted "
+    "by that", "Check the time stamps of the channel.",
+)  # fmt: skip
+OUTLIERS = Kind(
+    "fused.outliers", Severity.CAUTION, "{samples} samples about {axis} lie beyond {limit:g} sigma and are left out",
+    "Run asflown telemetry check on the file.",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -47,11 +58,12 @@ class AxisFit:
 
 
 def fit_levels(body: Body, series: list[Series], known: Known | None = None) -> AxisFit:
-    """Fit one axis; samples that all the others contradict are left out, clocks that surely disagree are set, and
-    the fit is repeated.  ``known``: a torque to take off before."""
+    """Fit one axis; outliers are left out, clocks with a significant offset are corrected, and the fit is repeated.
+
+    ``known``: a torque to take off first."""
     centre = body.starting_levels(series)
     count = sum(len(s.values) for s in series)
-    # levels not yet fitted: only what no level would explain
+    # the levels are not fitted yet: only samples that no levels would explain are left out here
     cleaned = _without_outliers(body, centre, series, known, 2 * OUTLYING)
     if cleaned is not series:
         series, centre = cleaned, body.starting_levels(cleaned)
@@ -71,16 +83,15 @@ def _without_outliers(body: Body, levels: Levels, series, known: Known | None, l
     kept, most = series, _MOST_OUTLYING * sum(len(s.values) for s in series)
     left_out = 0
     while True:
-        times, data = arrange(kept)
-        data = without_known(body, levels, times, data, known)
-        alone = np.abs(np.nan_to_num(smooth(body.smooth_model(levels, times), data).alone))
-        worst = _worst(alone, times.seconds[step_of(data)], limit)
+        axis = AxisData.of(body, levels, kept).without_known(known)
+        alone = np.abs(np.nan_to_num(smooth(axis.model, axis.data).alone))
+        worst = _worst(alone, axis.time_s[step_of(axis.data)], limit)
         left_out += len(worst)
         if left_out > most:
             return series
         if not len(worst):
             return kept
-        kept = _without(kept, times, data, worst)
+        kept = _without(kept, axis, worst)
 
 
 def _worst(alone: np.ndarray, at_s: np.ndarray, limit: float) -> np.ndarray:
@@ -94,12 +105,11 @@ def _worst(alone: np.ndarray, at_s: np.ndarray, limit: float) -> np.ndarray:
 
 def _most_probable(body: Body, centre: Levels, start: Levels, series, known: Known | None) -> Levels:
     kind, middle, spread = type(centre), centre.logs(), np.array(body.SPREAD)
-    blocks = [arrange(part) for part in _blocks(series)]
-    blocks = [(times, without_known(body, start, times, data, known)) for times, data in blocks]
+    blocks = [AxisData.of(body, start, part).without_known(known) for part in _blocks(series)]
 
     def cost(p):
         levels = kind.from_logs(p)
-        value = sum(log_likelihood(body.smooth_model(levels, times), data) for times, data in blocks)
+        value = sum(log_likelihood(body.smooth_model(levels, block.times), block.data) for block in blocks)
         return (-value if np.isfinite(value) else 1e10) + 0.5 * np.sum(((p - middle) / spread) ** 2)
 
     bounds = list(zip(middle - 4 * spread, middle + 4 * spread, strict=True))
@@ -130,9 +140,8 @@ def _offsets(body: Body, levels: Levels, series, known: Known | None) -> dict[st
 
     def cost(row: int, shift: float) -> float:
         moved = [s.later(-(shift if s.row == row else shifts.get(s.row, 0.0))) for s in series]
-        times, data = arrange(moved)
-        data = without_known(body, levels, times, data, known)
-        return -log_likelihood(body.smooth_model(levels, times), data)
+        axis = AxisData.of(body, levels, moved).without_known(known)
+        return -log_likelihood(axis.model, axis.data)
 
     for _ in range(2):
         for row in shifts:
@@ -157,25 +166,23 @@ def _offsets(body: Body, levels: Levels, series, known: Known | None) -> dict[st
     return found
 
 
-def _without(series, times: Times, data: Measurements, bad: np.ndarray) -> list[Series]:
-    step, row = step_of(data), channel_of(times, data)
+def _without(series, axis: AxisData, bad: np.ndarray) -> list[Series]:
+    step, row = step_of(axis.data), axis.channel
     kept = []
     for s in series:
-        drop = times.seconds[step[bad[row[bad] == s.row]]]
+        drop = axis.time_s[step[bad[row[bad] == s.row]]]
         keep = ~np.isin(np.round(s.seconds * 1e3), np.round(drop * 1e3))
         kept.append(s.where(keep))
     return kept
 
 
-def fit_doubts(axis: str, fit: AxisFit) -> list[str]:
+def fit_doubts(axis: str, fit: AxisFit) -> list[Doubt]:
     """What one axis's fit leaves to doubt."""
-    doubts = []
-    for channel, o in fit.offsets.items():
-        if o.corrected:
-            doubts.append(
-                f"{channel} about {axis} is {abs(o.seconds):.2f} +- {o.sigma:.2f} s {'late' if o.seconds > 0 else 'early'} against "
-                "the actuators' telemetry: its times are shifted by that; check the time stamps"
-            )
+    doubts = [
+        TIMES_SHIFTED(channel=channel, axis=axis, shift_s=abs(o.seconds), sigma_s=o.sigma,
+                      side="late" if o.seconds > 0 else "early")
+        for channel, o in fit.offsets.items() if o.corrected
+    ]  # fmt: skip
     if fit.left_out:
-        doubts.append(f"{fit.left_out} samples about {axis} lie beyond {OUTLYING:g} sigma and are left out")
+        doubts.append(OUTLIERS(samples=fit.left_out, axis=axis, limit=OUTLYING))
     return doubts

@@ -8,6 +8,7 @@ import numpy as np
 from scipy import ndimage
 
 from ...kit.regression import noise_sigma
+from ...kit.scatter import robust_sigma
 from ...kit.smoother import Measurements
 
 #: Rows of every model's H, by what is measured.
@@ -43,7 +44,7 @@ class Series:
         A jump is a step far from those around it; a steady rise has none."""
         step, dt = np.diff(self.values), np.diff(self.seconds)
         odd = np.abs(step - ndimage.median_filter(step, 5))
-        rate = np.where(odd > _A_JUMP * max(1.4826 * float(np.median(odd)), self.quantum), odd / dt, 0.0)
+        rate = np.where(odd > _A_JUMP * max(robust_sigma(odd), self.quantum), odd / dt, 0.0)
         steep = np.maximum(np.append(rate, 0.0), np.append(0.0, rate))
         return replace(self, steep=steep if steep.any() else None)
 

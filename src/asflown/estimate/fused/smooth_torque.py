@@ -14,36 +14,32 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...kit.ensemble import gains, paths, smoothed, whiten
-from ...kit.smoother import Measurements, smooth
-from .body import Body, Posterior
+from ...kit.smoother import smooth
+from .body import AxisData, Posterior
 
 if TYPE_CHECKING:
-    from .series import Times
+    from numpy.random import Generator
 
 
-def gaussian_torque(
-    body: Body, levels, times: Times, data: Measurements, columns: np.ndarray, count: int, rng: np.random.Generator
-) -> Posterior:
-    """The posterior at fixed ``levels``, with ``count`` paths; ``columns``: (M, P), of one sigma each."""
-    model = body.smooth_model(levels, times)
+def gaussian_torque(axis: AxisData, count: int, rng: Generator) -> Posterior:
+    """The posterior at the axis's levels, with ``count`` paths."""
+    model, data, columns = axis.model, axis.data, axis.columns
     g, best = gains(model, data), smooth(model, data)
     X = whiten(g, columns)
     precision = X.T @ X + np.eye(X.shape[1])
     offset = np.linalg.solve(precision, X.T @ g.own)
     spread = np.linalg.cholesky(np.linalg.inv(precision))
     drawn = offset + rng.standard_normal((count, len(offset))) @ spread.T
-    torque = [body.torque]
+    torque = [axis.body.torque]
     moved = smoothed(g, columns, torque)[:, 0, :]  # (N, P): what a sigma of each does to the torque
-    mean = best.mean[:, body.torque] - moved @ offset
+    mean = best.mean[:, axis.body.torque] - moved @ offset
     drawn_paths = paths(g, data.value[:, None] - columns @ drawn.T, torque, rng)[:, :, 0]
-    size = body.inertia_kgm2
-    return Posterior(size * mean, size * drawn_paths, drawn, g.own - X @ offset, {})
+    size = axis.body.inertia_kgm2
+    return Posterior(size * mean, size * drawn_paths, drawn, g.own - X @ offset)
 
 
-def widened(
-    post: Posterior, body: Body, levels, times: Times, data: Measurements, columns: np.ndarray, rng: np.random.Generator
-) -> Posterior:
-    """A posterior made without the ``columns`` (M, P), its paths moved by what is taken as known, of which nothing is learnt."""
-    drawn = rng.standard_normal((len(post.paths), columns.shape[1]))
-    moved = smoothed(gains(body.smooth_model(levels, times), data), columns, [body.torque])[:, 0, :]
-    return replace(post, paths=post.paths - body.inertia_kgm2 * drawn @ moved.T, considered=drawn)
+def widened(post: Posterior, axis: AxisData, rng: Generator) -> Posterior:
+    """A posterior made without the axis's columns, its paths moved by what is taken as known, of which nothing is learnt."""
+    drawn = rng.standard_normal((len(post.paths), axis.columns.shape[1]))
+    moved = smoothed(gains(axis.model, axis.data), axis.columns, [axis.body.torque])[:, 0, :]
+    return replace(post, paths=post.paths - axis.body.inertia_kgm2 * drawn @ moved.T, considered=drawn)

@@ -5,68 +5,20 @@ whitened data and answers alike, under a remainder that is a Gaussian process of
 
     y = W T(nodes) + e,   e ~ N(0, 1)
 
-and whatever is taken as known (an inertia, a gain) has been solved for beside, with its own sigma as a prior.  Lag and smoothing never enter.
+and whatever is taken as known (an inertia, a gain) is solved for too, with its own sigma as a prior.  There is neither lag nor smoothing.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...kit.ensemble import Gains, gains, paths, whiten
-from ...kit.smoother import Measurements, smooth
-from .body import Body, Levels, response, without_known
-from .series import Times, step_of
 
-
-@dataclass(frozen=True)
-class AxisData:
-    """One axis as the fused method prepared it: levels fitted, outliers and the turning of other axes taken off.
-
-    ``columns``: (M, P), what each quantity taken as known does to the measurements by one sigma; ``start_s``: of the pass,
-    from the telemetry's epoch."""
-
-    body: Body
-    levels: Levels
-    times: Times
-    data: Measurements
-    columns: np.ndarray
-    start_s: float
-
-    @property
-    def time_s(self) -> np.ndarray:
-        """Instants of the pass from the epoch. (N,)"""
-        return self.start_s + self.times.seconds
-
-    @property
-    def measured_s(self) -> np.ndarray:
-        """When each measurement was taken, from the epoch. (M,)"""
-        return self.time_s[step_of(self.data)]
-
-    def smooth_torque(self) -> np.ndarray:
-        """Of the fitted levels, at the instants of the pass. (N,) [N m]"""
-        best = smooth(self.body.smooth_model(self.levels, self.times), self.data)
-        return self.body.inertia_kgm2 * best.mean[:, self.body.torque]
-
-    def without(self, torque_Nm: np.ndarray) -> AxisData:
-        """The same less what a known torque (N,), at the instants of the pass, does."""
-        return replace(self, data=without_known(self.body, self.levels, self.times, self.data, lambda _: torque_Nm))
-
-    def until(self, stop_s: float) -> AxisData:
-        """The same less what was measured later [s from the epoch]."""
-        n = int(np.sum(self.measured_s <= stop_s))  # they are in order of time
-        start, row, value = self.data.start, self.data.row, self.data.value
-        return replace(self, data=Measurements(np.minimum(start, n), row[:n], value[:n]), columns=self.columns[:n])
-
-    def answers(self, nodes_s: np.ndarray) -> np.ndarray:
-        """Measurements (M, C) that torques of 1 N m at each node give, straight lines to zero at the nodes beside it."""
-        return response(self.body, self.levels, self.times, self.data, hats(self.time_s, nodes_s))
-
-
-def hats(time_s: np.ndarray, nodes_s: np.ndarray) -> np.ndarray:
-    """Values (N, C) at some instants of piecewise linear functions that are 1 at one of the even nodes, 0 at all others."""
-    return np.maximum(1 - np.abs(np.asarray(time_s)[:, None] - nodes_s) / (nodes_s[1] - nodes_s[0]), 0.0)
+if TYPE_CHECKING:
+    from .body import AxisData
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,18 @@
 """Maneuver execution errors: the Gates model, its fit, its judgement, and what it foretells."""
 
-from .checks import Directions
-from .fit import TERMS, fit_gates
-from .intervals import Interval
-from .judge import Judgement, judge_gates
-from .patch import Patch, across_patch
-from .planned import predict
-from .result import GatesFit, Part
-from .watch import FEWEST_BEFORE, Watch, watch_maneuvers
+from .checks import Directions, Shape, Spread
+from .fit import gates
+from .intervals import Ends
+from .judge import gates_judgement
+from .judgement import GatesJudgement
+from .patch import GatesPatch, gates_patch
+from .planned import GatesPredictionResult, gates_prediction
+from .result import GatesResult, Part
+from .terms import SIGMAS, Law, Term
+from .watch import FEWEST_BEFORE, GatesWatchResult, gates_watch
 
 __all__ = [
-    "FEWEST_BEFORE", "TERMS", "Directions", "GatesFit", "Interval", "Judgement", "Part", "Patch", "Watch",
-    "across_patch", "fit_gates", "judge_gates", "predict", "watch_maneuvers",
+    "FEWEST_BEFORE", "SIGMAS", "Directions", "Ends", "GatesJudgement", "GatesPatch", "GatesPredictionResult", "GatesResult",
+    "GatesWatchResult", "Law", "Part", "Shape", "Spread", "Term", "gates", "gates_judgement", "gates_patch", "gates_prediction",
+    "gates_watch",
 ]  # fmt: skip

@@ -2,56 +2,97 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import comb
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
+
+if TYPE_CHECKING:
+    from ...maneuvers.model import Quantity
 
 #: Share of a normal distribution inside one sigma.
 INSIDE = float(stats.norm.cdf(1) - stats.norm.cdf(-1))
 
 
 @dataclass(frozen=True)
-class Spread:
-    """Errors of one component about a mean.
+class Shape:
+    """The distribution of a quantity's standardised errors, all rows together, beside the normal one.
 
-    ``inside`` counts those within one sigma of model and orbit determination together, of which 68 % are to be expected;
-    ``inside_model`` those within the model's own sigma, as the papers count.  ``below``: errors below zero (underburns).
-    None where no model is known."""
+    ``envelope`` (2, M): 95 % of sets simulated from the fit and fitted anew; ``p``: of the largest distance between the distributions."""
 
-    name: str
-    count: int
-    below: int
-    sign_p: float
-    inside: int | None
-    inside_model: int | None
-    band: tuple[int, int] | None
-    standardised: np.ndarray = field(repr=False)  # (N,), about the mean; NaN where no model is known
-    quantiles: np.ndarray | None = field(default=None, repr=False)  # sorted, of all rows of the part
-    envelope: np.ndarray | None = field(default=None, repr=False)  # (2, M)
-    shape_p: float | None = None
+    quantiles: np.ndarray  # (M,), sorted
+    envelope: np.ndarray
+    p: float
+
+    @property
+    def normal_quantiles(self) -> np.ndarray:
+        """What is to be expected of M sorted normal numbers, (M,)."""
+        n = len(self.quantiles)
+        return stats.norm.ppf((np.arange(n) + 0.5) / n)
 
     @property
     def pit(self) -> np.ndarray:
-        """Probability integral transform of every error: uniform where the model is right."""
-        return stats.norm.cdf(self.standardised)
+        """Probability integral transform of every error: uniform where the model is right, (M,)."""
+        return stats.norm.cdf(self.quantiles)
+
+    def count_band(self, bins: int) -> tuple[float, float]:
+        """How many errors a bin of the transform holds in 95 of 100 sets."""
+        low, high = stats.binom.interval(0.95, len(self.quantiles), 1 / bins)
+        return float(low), float(high)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Errors of one component about a mean: of the magnitude, or of pointing along one axis.
+
+    ``inside`` counts those within one sigma of model and orbit determination together, of which 68 % are to be expected;
+    ``inside_model`` those within the model's own sigma, as the paper counts.  ``below``: errors below zero (underburns).
+    None where no model is known."""
+
+    quantity: Quantity
+    axis: str
+    count: int
+    below: int
+    sign_p: float
+    inside: int | None = None
+    inside_model: int | None = None
+    band: tuple[int, int] | None = None
+    standardised: np.ndarray | None = field(default=None, repr=False)  # (N,), about the mean
+    shape: Shape | None = field(default=None, repr=False)
+
+    @property
+    def name(self) -> str:
+        return f"{self.quantity} {self.axis}".strip()
 
     def record(self) -> dict:
-        counts = np.histogram(self.pit, bins=10, range=(0, 1))[0].tolist() if self.inside is not None else None
+        counts = None
+        if self.standardised is not None:
+            counts = np.histogram(stats.norm.cdf(self.standardised), bins=10, range=(0, 1))[0].tolist()
         return {
             "name": self.name, "count": self.count, "below_zero": self.below, "above_zero": self.count - self.below, "sign_p": self.sign_p,
             "inside_1_sigma": self.inside, "inside_model_1_sigma": self.inside_model, "inside_band95": None if self.band is None else list(self.band),
-            "pit_counts": counts, "distribution_p": self.shape_p,
+            "pit_counts": counts, "distribution_p": None if self.shape is None else self.shape.p,
         }  # fmt: skip
 
-    def __str__(self) -> str:
-        said = f"{self.name:14s}  below zero {self.below} of {self.count} ({100 * self.below / self.count:.0f} %, p = {self.sign_p:.2g})"
-        if self.inside is not None and self.band is not None:
-            said += f"; inside 1 sigma {self.inside} ({self.band[0]} to {self.band[1]}), {self.inside_model} without tracking's"
-        if self.shape_p is not None:
-            said += f"; distribution p = {self.shape_p:.2g}"
-        return said
+    #: Heads of ``row``.
+    HEAD = (
+        "component",
+        "below zero",
+        "p of signs",
+        "inside 1 sigma",
+        "expected",
+        "by the model alone",
+        "p of distribution",
+    )
+
+    def row(self) -> tuple[str, ...]:
+        known = ("", "", "")
+        if self.band is not None:
+            known = (str(self.inside), f"{self.band[0]} to {self.band[1]}", str(self.inside_model))
+        shape = "" if self.shape is None else f"{self.shape.p:.2g}"
+        return (self.name, f"{self.below} of {self.count}", f"{self.sign_p:.2g}", *known, shape)
 
 
 def sign_test(below: int, count: int) -> float:
@@ -65,17 +106,19 @@ def inside_band(count: int) -> tuple[int, int]:
     return int(low), int(high)
 
 
-def spread_of(name: str, error_mps, mean_mps, sigma_mps, od_mps, shape) -> Spread:
-    """``mean_mps`` None: no model is known.  ``shape``: sorted standardised rows, their envelope, and a p-value."""
+def spread_of(
+    quantity: Quantity, axis: str, error_mps, mean_mps, sigma_mps, od_mps, shape: Shape | None = None
+) -> Spread:
+    """Counts of errors (N,); ``mean_mps`` None: no model is known."""
     below, n = int(np.sum(error_mps < 0)), len(error_mps)
+    counted = Spread(quantity, axis, n, below, sign_test(below, n))
     if mean_mps is None:
-        return Spread(name, n, below, sign_test(below, n), None, None, None, np.full(n, np.nan))
+        return counted
     off = error_mps - mean_mps
     standardised = off / np.sqrt(sigma_mps**2 + od_mps**2 + 1e-24)
-    quantiles, envelope, p = shape or (None, None, None)
-    return Spread(
-        name, n, below, sign_test(below, n), int(np.sum(np.abs(standardised) <= 1)), int(np.sum(np.abs(off) <= sigma_mps)), inside_band(n),
-        standardised, quantiles, envelope, p,
+    return replace(
+        counted, inside=int(np.sum(np.abs(standardised) <= 1)), inside_model=int(np.sum(np.abs(off) <= sigma_mps)),
+        band=inside_band(n), standardised=standardised, shape=shape,
     )  # fmt: skip
 
 
@@ -98,7 +141,7 @@ class Directions:
 
     def __str__(self) -> str:
         return (
-            f"directions      towards {np.degrees(self.mean_rad):+.0f} deg from X (resultant {self.length:.2f}), uniform: p = {self.rayleigh_p:.2g} "
+            f"directions: towards {np.degrees(self.mean_rad):+.0f} deg from X (resultant {self.length:.2f}), uniform: p = {self.rayleigh_p:.2g} "
             f"(Rayleigh), {self.hodges_ajne_p:.2g} (Hodges-Ajne)"
         )
 

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
 #: Sigmas are looked for up to this many times the scatter of the errors; beyond, an interval has no upper end.
 _FARTHEST = 30.0
-Interval = tuple[float | None, float | None]
+#: Of a 95 % interval: low and high, None where open.
+Ends = tuple[float | None, float | None]
 
 
 @cache
@@ -37,7 +38,7 @@ def _cuts() -> tuple[np.ndarray, np.ndarray]:
     return far, np.array([optimize.brentq(accepted, 1.0, 5.0, args=(x,)) for x in far])
 
 
-def sigma_interval(problem: Problem, best: Point, which: int) -> Interval:
+def sigma_interval(problem: Problem, best: Point, which: int) -> Ends:
     """95 % interval of one sigma (0 fixed, 1 proportional); from zero where it is a limit, None where it has no end."""
     unit = problem.units[which]
     name = ("fixed", "proportional")[which]
@@ -78,7 +79,7 @@ def _cut(problem: Problem, at: Point, which: int) -> float:
     return float(np.interp(variance * np.sqrt(max(known, 0.0)), *_cuts()))
 
 
-def bias_intervals(problem: Problem, best: Point) -> list[Interval]:
+def bias_intervals(problem: Problem, best: Point) -> list[Ends]:
     """95 % interval of every bias, from the profile of the full likelihood.
 
     The ratio allowed by chance is the exact one of a linear model with one unknown variance, log(1 + t^2 / (M - p)) M,
@@ -94,7 +95,7 @@ def bias_intervals(problem: Problem, best: Point) -> list[Interval]:
     return [_bias_interval(full, top, j, cut, float(t * spread[j])) for j in range(p)]
 
 
-def _bias_interval(full: Problem, top: Point, j: int, cut: float, step: float) -> Interval:
+def _bias_interval(full: Problem, top: Point, j: int, cut: float, step: float) -> Ends:
     unit = full.bias_units[j]
     rest = replace(full, X=np.ascontiguousarray(np.delete(full.X, j, axis=1)), bias_units=np.delete(full.bias_units, j))
 

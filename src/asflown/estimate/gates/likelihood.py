@@ -6,7 +6,7 @@ Restricted (REML), the likelihood has the biases integrated out, which takes awa
 likelihood underestimates sigmas.  A two-dimensional pointing error becomes two rows, along the axes of its orbit
 determination's ellipse: a + b v^2 is the same in all directions, so that the rows are independent.
 
-Inside, y and v are in units of their own rms (of y with tracking).  The kernels take a row a measurement, (M,), and columns of the biases, (M, p).
+Inside, y and v are in units of their own rms (of y with tracking).
 """
 
 from __future__ import annotations
@@ -16,148 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from ...kit.compiled import jit
+from . import kernel
 
-#: Variance below which nothing is told apart from nothing, in units of mean y^2.
-_FLOOR = 1e-12
 #: log density of one component of a Gaussian: half of this.
 LOG_2PI = float(np.log(2 * np.pi))
-
-
-@jit
-def _evaluate(a, b, y, d, z, X, k, reml, prior, beta, out):
-    """Objective (-log likelihood without constants); biases into ``beta``, gradient and expected Hessian into ``out``."""
-    M, p = X.shape
-    A = np.zeros((p, p))  # then its Cholesky factor, with one over the diagonal
-    c, h = np.zeros(p), np.zeros(p)
-    inverse = np.empty(M)
-    f = 0.0
-    for i in range(M):
-        s = max(d[i] + a + b * z[i], _FLOOR)
-        inverse[i] = 1 / s
-        f += 0.5 * k[i] * np.log(s)
-        w = k[i] * inverse[i]
-        for j in range(p):
-            wx = w * X[i, j]
-            c[j] += wx * y[i]
-            for q in range(j + 1):
-                A[j, q] += wx * X[i, q]
-    for j in range(p):
-        for q in range(j + 1):
-            t = A[j, q]
-            for m in range(q):
-                t -= A[j, m] * A[q, m]
-            if j == q:
-                root = np.sqrt(max(t, 1e-14 * A[j, j]))  # of burns all of one size: either bias does, neither is known
-                A[j, j] = 1 / root
-                if reml:
-                    f += np.log(root)
-            else:
-                A[j, q] = t * A[q, q]
-    for j in range(p):
-        t = c[j]
-        for m in range(j):
-            t -= A[j, m] * c[m]
-        c[j] = t * A[j, j]
-    for j in range(p - 1, -1, -1):
-        t = c[j]
-        for m in range(j + 1, p):
-            t -= A[m, j] * beta[m]
-        beta[j] = t * A[j, j]
-    ga, gb, haa, hab, hbb = 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(M):
-        r = y[i]
-        for j in range(p):
-            r -= X[i, j] * beta[j]
-        w = k[i] * inverse[i]
-        f += 0.5 * w * r * r
-        curve = 0.5 * w * inverse[i]
-        slope = 0.5 * w - curve * r * r
-        if reml:  # less the diagonal of the hat matrix
-            for j in range(p):
-                t = X[i, j]
-                for m in range(j):
-                    t -= A[j, m] * h[m]
-                h[j] = t * A[j, j]
-                slope -= curve * h[j] * h[j]
-        ga += slope
-        gb += slope * z[i]
-        haa += curve
-        hab += curve * z[i]
-        hbb += curve * z[i] * z[i]
-    if prior[1] > 0:
-        root = np.sqrt(max(a, 1e-10))
-        f += 0.5 * ((root - prior[0]) / prior[1]) ** 2
-        ga += 0.5 * (1 - prior[0] / root) / prior[1] ** 2
-        haa += 0.25 * prior[0] / root**3 / prior[1] ** 2
-    if prior[3] > 0:
-        root = np.sqrt(max(b, 1e-10))
-        f += 0.5 * ((root - prior[2]) / prior[3]) ** 2
-        gb += 0.5 * (1 - prior[2] / root) / prior[3] ** 2
-        hbb += 0.25 * prior[2] / root**3 / prior[3] ** 2
-    out[0], out[1], out[2], out[3], out[4] = ga, gb, haa, hab, hbb
-    return f
-
-
-@jit
-def _descend(a, b, free_a, free_b, y, d, z, X, k, reml, prior, beta, out):
-    """From one start to a minimum, by scoring steps kept at or above zero.  Returns a, b and the objective."""
-    f = _evaluate(a, b, y, d, z, X, k, reml, prior, beta, out)
-    for _ in range(200):
-        ga, gb, haa, hab, hbb = out[0], out[1], out[2], out[3], out[4]
-        move_a = free_a and not (a <= 0 and ga >= 0)
-        move_b = free_b and not (b <= 0 and gb >= 0)
-        if move_a and move_b:
-            determinant = haa * hbb * (1 + 1e-9) - hab * hab
-            da = -(hbb * ga - hab * gb) / determinant
-            db = -(haa * gb - hab * ga) / determinant
-        elif move_a:
-            da, db = -ga / haa, 0.0
-        elif move_b:
-            da, db = 0.0, -gb / hbb
-        else:
-            break
-        step, better = 1.0, False
-        for _try in range(40):
-            na, nb = max(a + step * da, 0.0), max(b + step * db, 0.0)
-            found = _evaluate(na, nb, y, d, z, X, k, reml, prior, beta, out)
-            if found < f:
-                better = True
-                break
-            step *= 0.5
-        if not better:
-            break
-        gain = f - found
-        still = abs(na - a) <= 1e-9 * (na + 1e-9) and abs(nb - b) <= 1e-9 * (nb + 1e-9)
-        a, b, f = na, nb, found
-        if gain < 1e-9 or still:
-            break
-    return a, b, f
-
-
-@jit
-def _minimum(starts, free_a, free_b, y, d, z, X, k, reml, prior, best_beta):
-    """The least objective over several starts (S, 2).  Returns a, b, objective; biases into ``best_beta``."""
-    beta, out = np.zeros(X.shape[1]), np.zeros(5)
-    best_a, best_b, best = starts[0, 0], starts[0, 1], np.inf
-    for n in range(starts.shape[0]):
-        a, b, f = _descend(starts[n, 0], starts[n, 1], free_a, free_b, y, d, z, X, k, reml, prior, beta, out)
-        if f < best - 1e-11:
-            best_a, best_b, best = a, b, f
-    best = _evaluate(best_a, best_b, y, d, z, X, k, reml, prior, best_beta, out)
-    return best_a, best_b, best
-
-
-@jit
-def _refits(sets, starts, free_a, free_b, d, z, X, k, reml, prior):
-    """The minimum of every row of ``sets`` (B, M): variances and biases, (B, 2 + p)."""
-    found = np.empty((sets.shape[0], 2 + X.shape[1]))
-    beta = np.zeros(X.shape[1])
-    for n in range(sets.shape[0]):
-        a, b, _ = _minimum(starts, free_a, free_b, sets[n], d, z, X, k, reml, prior, beta)
-        found[n, 0], found[n, 1] = a, b
-        found[n, 2:] = beta
-    return found
 
 
 @dataclass(frozen=True)
@@ -170,6 +32,11 @@ class Point:
     beta: np.ndarray  # (p,)
     objective: float
     information: np.ndarray
+
+    @property
+    def values(self) -> np.ndarray:
+        """Fixed and proportional sigma, then the biases, (2 + p,)."""
+        return np.array([self.fixed, self.proportional, *self.beta])
 
 
 #: Of too few burns to look at all.
@@ -231,7 +98,7 @@ class Problem:
         """Whether errors are taken to be normal."""
         return True
 
-    def weights(self, point: Point) -> np.ndarray:
+    def weights(self, point: Point) -> np.ndarray:  # noqa: ARG002 - those of the robust likelihood depend on it
         """What each burn counts beside a usual one, (N,)."""
         return np.ones(len(np.unique(self.burn)))
 
@@ -262,10 +129,10 @@ class Problem:
     def _maximised(self, starts, free):
         """The kernel's variances, objective and biases."""
         beta = np.zeros(self.X.shape[1])
-        return *_minimum(starts, *free, self.y, self.d, self.v**2, self.X, self.k, self.reml, np.array(self.prior), beta), beta  # fmt: skip
+        return *kernel.minimum(starts, *free, self.y, self.d, self.v**2, self.X, self.k, self.reml, np.array(self.prior), beta), beta  # fmt: skip
 
     def _refitted(self, sets, starts, free):
-        return _refits(sets, starts, *free, self.d, self.v**2, self.X, self.k, self.reml, np.array(self.prior))
+        return kernel.refits(sets, starts, *free, self.d, self.v**2, self.X, self.k, self.reml, np.array(self.prior))
 
     def _starts(self, given, near: Point | None) -> np.ndarray:
         """Inside, and from each edge: the likelihood may have a maximum on either."""
@@ -280,20 +147,15 @@ class Problem:
 
     def _point(self, a, b, f, beta) -> Point:
         out, scratch = np.zeros(5), np.zeros_like(beta)
-        _evaluate(a, b, self.y, self.d, self.v**2, self.X, self.k, self.reml, np.array(self.prior), scratch, out)
+        kernel.evaluate(a, b, self.y, self.d, self.v**2, self.X, self.k, self.reml, np.array(self.prior), scratch, out)
         roots = np.sqrt([a, b]) * self.units
-        return Point(
-            float(roots[0]),
-            float(roots[1]),
-            beta * self.bias_units,
-            float(f),
-            np.array([[out[2], out[3]], [out[3], out[4]]]),
-        )
+        information = np.array([[out[2], out[3]], [out[3], out[4]]])
+        return Point(float(roots[0]), float(roots[1]), beta * self.bias_units, float(f), information)
 
     def variances(self, point: Point) -> np.ndarray:
         """Variance of every row at a point, dimensionless, (M,)."""
         a, b = np.square([point.fixed, point.proportional] / self.units)
-        return np.maximum(self.d + a + b * self.v**2, _FLOOR)
+        return np.maximum(self.d + a + b * self.v**2, kernel.FLOOR)
 
     def bias_covariance(self, point: Point) -> np.ndarray:
         """Covariance of the biases at a point's sigmas, user's units, (p, p)."""

@@ -1,22 +1,62 @@
-"""What is left of a bias after a patch: the epochs before and after it, under one model (002 Figures 1, 3, 5, 7)."""
+"""What is left of a bias after a patch: the epochs before and after it, under one model (Wagner 2014 Figures 1, 3, 5, 7)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from scipy import stats
 
+from ...kit.digits import plus_minus
+from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput
+from ...kit.result import Estimate, recorded, with_old_keys
+from ...kit.schema import Annotated, Doc, Number, TypedDict
+from ...kit.table import Table
+from ...maneuvers.model import Quantity
 from .checks import sign_test
-from .fit import problems
+from .likelihoods import problems
 
 if TYPE_CHECKING:
     from ...maneuvers.table import Maneuvers
+    from .likelihood import Point
 
 #: Burns on either side that a comparison takes: two biases, and something to spare.
 _FEWEST = 4
+#: p-value below which a difference is doubted to be chance.
+_P = 0.05
+
+BIAS_LEFT = Kind(
+    "gates.bias-left", Severity.SUSPECT, "a bias is left after the patch before {burn} (p = {p:.2g})", "See the epoch 'after'.",
+)  # fmt: skip
+EPOCHS_DIFFER = Kind(
+    "gates.epochs-differ", Severity.SUSPECT,
+    "with the bias taken out, the errors before and after {burn} still differ (p = {p:.2g}): the patch changed something else, "
+    "or the two epochs do not have one model",
+    "Fit the epochs apart.",
+)  # fmt: skip
+
+
+class EpochRecord(TypedDict):
+    name: str
+    count: int
+    below_zero: int
+    above_zero: int
+    sign_p: Number
+    bias_fixed_mps: Number
+    bias_fixed_sigma_mps: Number
+    bias_proportional: Number
+    bias_proportional_sigma: Number
+    bias_p: Annotated[Number, Doc("of no bias at all")]
+
+
+class PatchRecord(TypedDict):
+    first_after: str
+    removed_fixed_mps: Number
+    removed_proportional: Number
+    epochs: Annotated[list[EpochRecord], Doc("before as flown, before with the bias taken out, after")]
+    difference_p: Annotated[Number, Doc("of one bias in the last two epochs")]
 
 
 @dataclass(frozen=True)
@@ -28,90 +68,119 @@ class Epoch:
     below: int
     sign_p: float
     bias_fixed_mps: float
-    sigma_bias_fixed_mps: float
+    bias_fixed_sigma_mps: float
     bias_proportional: float
-    sigma_bias_proportional: float
+    bias_proportional_sigma: float
     bias_p: float
 
     def record(self) -> dict:
         return {
             "name": self.name, "count": self.count, "below_zero": self.below, "above_zero": self.count - self.below, "sign_p": self.sign_p,
-            "bias_fixed_mps": self.bias_fixed_mps, "sigma_bias_fixed_mps": self.sigma_bias_fixed_mps,
-            "bias_proportional": self.bias_proportional, "sigma_bias_proportional": self.sigma_bias_proportional, "bias_p": self.bias_p,
+            "bias_fixed_mps": self.bias_fixed_mps, "bias_fixed_sigma_mps": self.bias_fixed_sigma_mps,
+            "bias_proportional": self.bias_proportional, "bias_proportional_sigma": self.bias_proportional_sigma, "bias_p": self.bias_p,
         }  # fmt: skip
 
-    def __str__(self) -> str:
-        return (
-            f"{self.name:18s} below zero {self.below} of {self.count} (p = {self.sign_p:.2g}); bias {1e3 * self.bias_fixed_mps:+.2f} +- "
-            f"{1e3 * self.sigma_bias_fixed_mps:.2f} mm/s, {100 * self.bias_proportional:+.3f} +- {100 * self.sigma_bias_proportional:.3f} % (p = {self.bias_p:.2g})"
-        )
+    def row(self) -> tuple[str, ...]:
+        fixed = plus_minus(1e3 * self.bias_fixed_mps, 1e3 * self.bias_fixed_sigma_mps)
+        proportional = plus_minus(100 * self.bias_proportional, 100 * self.bias_proportional_sigma)
+        below = f"{self.below} of {self.count}"
+        return (self.name, below, f"{self.sign_p:.2g}", fixed, proportional, f"{self.bias_p:.2g}")
 
 
-@dataclass(frozen=True)
-class Patch:
-    """Epochs before (as flown), before (bias taken out) and after; ``difference_p``: of one bias in the last two."""
+@dataclass(frozen=True, kw_only=True, repr=False)
+class GatesPatch(Estimate):
+    """Epochs before (as flown), before (bias taken out) and after; ``difference_p``: of one bias in the last two.
 
-    id: str
+    ``maneuvers``: all of them as if the patch had been there from the start."""
+
+    RECORD: ClassVar[type] = PatchRecord
+    OLD_KEYS: ClassVar[dict[str, str]] = {
+        "epochs[].sigma_bias_fixed_mps": "bias_fixed_sigma_mps",
+        "epochs[].sigma_bias_proportional": "bias_proportional_sigma",
+    }
+
+    first_after: str
     removed_fixed_mps: float
     removed_proportional: float
     epochs: tuple[Epoch, Epoch, Epoch]
     difference_p: float
+    maneuvers: Maneuvers
 
-    def record(self) -> dict:
-        return {
-            "first_after": self.id, "removed_fixed_mps": self.removed_fixed_mps, "removed_proportional": self.removed_proportional,
+    def _record(self) -> dict:
+        record = {
+            "first_after": self.first_after, "removed_fixed_mps": self.removed_fixed_mps, "removed_proportional": self.removed_proportional,
             "epochs": [e.record() for e in self.epochs], "difference_p": self.difference_p,
         }  # fmt: skip
+        with_old_keys(record, self.OLD_KEYS)  # it also stands within the record of a fit
+        return record
 
-    def __str__(self) -> str:
-        lines = [
-            f"patch before {self.id}, taking out {1e3 * self.removed_fixed_mps:+.3g} mm/s and {100 * self.removed_proportional:+.3g} %"
-        ]
-        lines += ["  " + str(e) for e in self.epochs]
-        return "\n".join([*lines, f"  the last two differ by chance: p = {self.difference_p:.2g}"])
-
-    @property
-    def doubts(self) -> tuple[str, ...]:
-        found = []
-        after = self.epochs[-1]
-        if after.bias_p < 0.05:
-            found.append(f"a bias is left after the patch before {self.id} (p = {after.bias_p:.2g})")
-        if self.difference_p < 0.05:
-            found.append(
-                f"before and after {self.id} the errors differ still, once the bias is taken out (p = {self.difference_p:.2g}): "
-                "the patch did something else, or both are not of one family"
-            )
-        return tuple(found)
+    def _tables(self) -> tuple[Table, ...]:
+        removed = f"{1e3 * self.removed_fixed_mps:+.3g} mm/s and {100 * self.removed_proportional:+.3g} %"
+        head = ("epoch", "below zero", "p of signs", "bias [mm/s]", "bias [%]", "p of no bias")
+        same = f"p of one bias in the last two: {self.difference_p:.2g}"
+        title = f"Patch before {self.first_after}, which took out {removed}"
+        return (Table(title, tuple(e.row() for e in self.epochs), head, (same,)),)
 
 
-def across_patch(m: Maneuvers, first_after: str, fixed_mps: float, proportional: float) -> tuple[Maneuvers, Patch]:
-    """All maneuvers as if the patch had been there from the start, and what became of the bias.
+@recorded
+def gates_patch(
+    maneuvers: Maneuvers, first_after: str, *, removed_fixed_mps: float = 0.0, removed_proportional: float = 0.0
+) -> GatesPatch:
+    """What became of the magnitude bias by a patch.
 
-    ``first_after``: id of the first burn flown with the patch; the bias taken out of those before it is fixed + proportional v.
-    Sigmas are those of all burns, adjusted.  Raises BadInput where either side has fewer than four burns."""
-    at = m.place(first_after)
+    Parameters
+    ----------
+    maneuvers : Maneuvers
+        Burns of one engine, before and after the patch.
+    first_after : str
+        Id of the first burn flown with the patch.
+    removed_fixed_mps, removed_proportional : float
+        The bias that the patch took out; it is taken out of the burns before it, whose magnitude error falls by
+        fixed + proportional v.
+
+    Returns
+    -------
+    GatesPatch
+        With all burns adjusted.  Sigmas are those of a fit to all of these.
+
+    Raises
+    ------
+    BadInput
+        Where either side has fewer than four burns, or the ledger says that this bias was taken out before.
+    """
+    m, at = maneuvers, maneuvers.place(first_after)
     if min(at, len(m) - at) < _FEWEST:
         raise BadInput(
             f"{at} burns before {first_after} and {len(m) - at} from it on: too few to compare", file=m.source or None,
             remedy=f"It takes {_FEWEST} on either side.",
         )  # fmt: skip
-    adjusted = m.with_bias_removed(at, fixed_mps, proportional, f"patch before {first_after}")
-    point = problems(adjusted)["magnitude"].minimum()
+    adjusted = m.with_bias_removed(at, removed_fixed_mps, removed_proportional, f"patch before {first_after}")
+    point = problems(adjusted)[Quantity.MAGNITUDE].minimum()
     spare = len(m) - 4
-    cuts = [
-        ("before, as flown", m.take(slice(0, at))),
-        ("before, adjusted", adjusted.take(slice(0, at))),
-        ("after", adjusted.take(slice(at, None))),
-    ]
-    fits = [_epoch(name, part, point, spare) for name, part in cuts]
-    (_, b, B), (_, a, A) = fits[1:]
+    flown, _, _ = _epoch("before, as flown", m.take(slice(0, at)), point, spare)
+    before, b, B = _epoch("before, adjusted", adjusted.take(slice(0, at)), point, spare)
+    after, a, A = _epoch("after", adjusted.take(slice(at, None)), point, spare)
     off = a - b
     difference = float(stats.f.sf(off @ np.linalg.solve(A + B, off) / 2, 2, spare))
-    first, second, third = (e for e, *_ in fits)
-    return adjusted, Patch(first_after, fixed_mps, proportional, (first, second, third), difference)
+    return GatesPatch(
+        first_after=first_after,
+        removed_fixed_mps=removed_fixed_mps,
+        removed_proportional=removed_proportional,
+        epochs=(flown, before, after),
+        difference_p=difference,
+        maneuvers=adjusted,
+        doubts=Doubts(_doubts(first_after, after, difference)),
+    )
 
 
-def _epoch(name: str, m: Maneuvers, point, spare: int) -> tuple[Epoch, np.ndarray, np.ndarray]:
+def _doubts(burn: str, after: Epoch, difference_p: float) -> list[Doubt | None]:
+    return [
+        BIAS_LEFT(burn=burn, p=after.bias_p) if after.bias_p < _P else None,
+        EPOCHS_DIFFER(burn=burn, p=difference_p) if difference_p < _P else None,
+    ]
+
+
+def _epoch(name: str, m: Maneuvers, point: Point, spare: int) -> tuple[Epoch, np.ndarray, np.ndarray]:
     """One epoch, its biases by weighted least squares at the sigmas of ``point``, and their covariance."""
     v = m.dv_mps
     w = 1 / (point.fixed**2 + (point.proportional * v) ** 2 + m.sigma_magnitude_mps**2 + 1e-18)
@@ -119,17 +188,7 @@ def _epoch(name: str, m: Maneuvers, point, spare: int) -> tuple[Epoch, np.ndarra
     covariance = np.linalg.pinv(X.T @ (w[:, None] * X), hermitian=True)
     bias = covariance @ X.T @ (w * m.magnitude_error_mps)
     p = float(stats.f.sf(bias @ np.linalg.pinv(covariance, hermitian=True) @ bias / 2, 2, spare))
-    sigma = np.sqrt(np.diag(covariance))
+    (fixed, proportional), sigma = bias.tolist(), np.sqrt(np.diag(covariance)).tolist()
     below = int(np.sum(m.magnitude_error_mps < 0))
-    epoch = Epoch(
-        name,
-        len(m),
-        below,
-        sign_test(below, len(m)),
-        float(bias[0]),
-        float(sigma[0]),
-        float(bias[1]),
-        float(sigma[1]),
-        p,
-    )
+    epoch = Epoch(name, len(m), below, sign_test(below, len(m)), fixed, sigma[0], proportional, sigma[1], p)
     return epoch, bias, covariance

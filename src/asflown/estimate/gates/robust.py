@@ -18,11 +18,9 @@ from functools import cache
 import numpy as np
 from scipy import integrate, optimize, special, stats
 
-from ...kit.compiled import jit
-from .likelihood import _FLOOR, Point, Problem, _evaluate, _minimum
-
-#: Degrees of freedom.
-FREEDOM = 4.0
+from . import kernel
+from .kernel import FREEDOM
+from .likelihood import Point, Problem
 
 
 @cache
@@ -36,55 +34,6 @@ def scale_of(components: int) -> float:
         return integrate.quad(pull, 0, np.inf)[0] - components
 
     return float(optimize.brentq(excess, 0.3, 1.5))
-
-
-@jit
-def _weigh(a, b, y, d, z, X, burn, c, beta, root):
-    """sqrt(u) / c of every row into ``root``.  Returns by what t's objective exceeds that of the normal one so weighted."""
-    n = burn.max() + 1
-    q, m, extra = np.zeros(n), np.zeros(n), 0.0
-    for i in range(len(y)):
-        r = y[i]
-        for j in range(X.shape[1]):
-            r -= X[i, j] * beta[j]
-        q[burn[i]] += r * r / max(d[i] + a + b * z[i], _FLOOR) / c**2
-        m[burn[i]] += 1
-    for i in range(len(y)):
-        root[i] = np.sqrt((FREEDOM + m[burn[i]]) / (FREEDOM + q[burn[i]])) / c
-    for g in range(n):
-        extra += 0.5 * (FREEDOM + m[g]) * (np.log1p(q[g] / FREEDOM) - q[g] / (FREEDOM + q[g]))
-    return extra
-
-
-@jit
-def _robust(starts, free_a, free_b, y, d, z, X, k, reml, prior, burn, c, beta):
-    """The most likely variances and the objective there; biases into ``beta``."""
-    starts, root, out = starts.copy(), np.empty(len(y)), np.zeros(5)
-    a, b, _ = _minimum(starts, free_a, free_b, y, d, z, X, k, reml, prior, beta)
-    last = np.inf
-    for _ in range(200):
-        extra = _weigh(a, b, y, d, z, X, burn, c, beta, root)
-        weighted, columns = y * root, X.copy()
-        for j in range(X.shape[1]):
-            columns[:, j] *= root
-        f = extra + _evaluate(a, b, weighted, d, z, columns, k, reml, prior, beta, out)
-        if abs(last - f) < 1e-9:
-            break
-        last = f
-        starts[0, 0], starts[0, 1] = a, b
-        a, b, _ = _minimum(starts, free_a, free_b, weighted, d, z, columns, k, reml, prior, beta)
-    return a, b, f
-
-
-@jit
-def _robust_refits(sets, starts, free_a, free_b, d, z, X, k, reml, prior, burn, c):
-    """The maximum of every row of ``sets`` (B, M): variances and biases, (B, 2 + p)."""
-    found = np.empty((sets.shape[0], 2 + X.shape[1]))
-    beta = np.zeros(X.shape[1])
-    for n in range(sets.shape[0]):
-        found[n, 0], found[n, 1], _ = _robust(starts, free_a, free_b, sets[n], d, z, X, k, reml, prior, burn, c, beta)
-        found[n, 2:] = beta
-    return found
 
 
 @dataclass(frozen=True)
@@ -101,16 +50,18 @@ class RobustProblem(Problem):
 
     def _maximised(self, starts, free):
         beta = np.zeros(self.X.shape[1])
-        return *_robust(starts, *free, self.y, self.d, self.v**2, self.X, self.k, self.reml, np.array(self.prior), self.burn, self._scale, beta), beta  # fmt: skip
+        return *kernel.robust_minimum(starts, *free, self.y, self.d, self.v**2, self.X, self.k, self.reml, np.array(self.prior), self.burn, self._scale, beta), beta  # fmt: skip
 
     def _refitted(self, sets, starts, free):
-        return _robust_refits(sets, starts, *free, self.d, self.v**2, self.X, self.k, self.reml, np.array(self.prior), self.burn, self._scale)  # fmt: skip
+        return kernel.robust_refits(sets, starts, *free, self.d, self.v**2, self.X, self.k, self.reml, np.array(self.prior), self.burn, self._scale)  # fmt: skip
 
     def weights(self, point: Point) -> np.ndarray:
         """What each burn counts beside a usual one, (N,): 1 + m / 4 at most, in the mean of a normal set about 1."""
         root = np.empty(len(self.y))
         a, b = np.square([point.fixed, point.proportional] / self.units)
-        _weigh(a, b, self.y, self.d, self.v**2, self.X, self.burn, self._scale, point.beta / self.bias_units, root)
+        kernel.weigh(
+            a, b, self.y, self.d, self.v**2, self.X, self.burn, self._scale, point.beta / self.bias_units, root
+        )
         return np.square(root * self._scale)[np.unique(self.burn, return_index=True)[1]]
 
     def log_likelihood(self, point: Point) -> float:

@@ -7,11 +7,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...kit.schema import Annotated, Doc, Interval, Number, TypedDict
+
 if TYPE_CHECKING:
     from .foreseen import Foreseen
 
 #: Sequences drawn for the p-value, and burns it takes.
 _DRAWS, _FEWEST = 4000, 3
+
+
+#: Its key "from" is a word of Python.
+ShiftRecord = TypedDict(
+    "ShiftRecord",
+    {
+        "from": Annotated[str, Doc("first burn after the change")],
+        "share": Annotated[Number, Doc("of the dV; negative: underburns")],
+        "share_ci95": Interval,
+        "ci95": Annotated[Interval, Doc("kept for this version; see share_ci95")],
+        "p": Number,
+        "posterior": Annotated[
+            dict[str, Number], Doc("burn -> chance that the change is there, given that there is one")
+        ],
+    },
+)
 
 
 @dataclass(frozen=True)
@@ -23,18 +41,21 @@ class Shift:
 
     id: str
     share: float
-    ci95: tuple[float, float]
+    share_ci95: tuple[float, float]
     p: float
     posterior: dict[str, float]
 
     def record(self) -> dict:
-        return {"from": self.id, "share": self.share, "ci95": list(self.ci95), "p": self.p, "posterior": self.posterior}
+        interval = list(self.share_ci95)
+        return {
+            "from": self.id, "share": self.share, "share_ci95": interval, "ci95": interval, "p": self.p, "posterior": self.posterior,
+        }  # fmt: skip
 
     def __str__(self) -> str:
-        low, high = (100 * x for x in self.ci95)
+        low, high = (100 * x for x in self.share_ci95)
         return (
             f"likeliest change: from {self.id} on by {100 * self.share:+.2g} % ({low:+.2g} to {high:+.2g}), "
-            f"{100 * self.posterior[self.id]:.0f} % of the places' chance, p = {self.p:.2g}"
+            f"posterior of that burn {100 * self.posterior[self.id]:.0f} %, p = {self.p:.2g}"
         )
 
 

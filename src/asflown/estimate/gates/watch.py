@@ -1,47 +1,110 @@
-"""Degradation: each new burn against the model before it (002, detecting degradation).
+"""Degradation: each new burn against the model before it (Wagner 2014, detecting degradation).
 
 A burn is judged by what the burns before it foretell: its error's predictive distribution, tracking and what the model is
 uncertain by included.  Three alarms, together wrong in ``false_alarm`` of all watches: one burn far out, a cumulated sum
 of burns that all fall to one side, and (of pointing) one burn far out.  Burns that raised the alarm do not enter the model
-that judges the next ones.  Beside them stand the papers' three criteria, which have no such rate."""
+that judges the next ones.  Beside them stand the paper's three criteria, which have no such rate."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from scipy import optimize, stats
 
+from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput
-from ...maneuvers.model import Gates
-from .fit import problems
+from ...kit.result import Estimate, recorded
+from ...kit.schema import Annotated, Doc, Number, TypedDict
+from ...kit.table import Table
+from ...maneuvers.model import Gates, Quantity
 from .foreseen import Foreseen, foresee, foresee_by
+from .likelihoods import problems
 from .power import detectable
-from .shift import Shift, find_shift
+from .shift import Shift, ShiftRecord, find_shift
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from ...maneuvers.history import PastModel
     from ...maneuvers.table import Maneuvers
 
+MAGNITUDE, POINTING = Quantity.MAGNITUDE, Quantity.POINTING
 #: Burns before the first that is watched, unless a model is given.
 FEWEST_BEFORE = 15
-#: The papers' rule: an error beyond two sigma of the model before it.
+#: The paper's rule: an error beyond two sigma of the model before it.
 _SIGMAS = 2.0
 #: The model changes significantly: a parameter moves by more of its sigmas than this.
 _CHANGED = 1.0
 #: Of the cumulated sum: half the mean shift, in sigmas, that it is quickest to see.
 _REFERENCE = 0.5
+#: Share of the dV by which an underburn should show.
+_SHOULD_SHOW = 0.1
+
+TOO_SMALL = Kind(
+    "gates.too-small-to-show", Severity.CAUTION, "too small for an underburn of {percent:g} % to raise the alarm: {burns}",
+)  # fmt: skip
+JUDGED_BY_MODEL = Kind(
+    "gates.judged-by-model", Severity.NOTE,
+    "the burns are judged by {model}, about the biases that it left: the false-alarm rate holds if that model does",
+)  # fmt: skip
+NO_TIMES = Kind(
+    "gates.no-times", Severity.NOTE, "the table has no times: the burns are taken in its order", "Add the column time [utc].",
+)  # fmt: skip
+
+
+class Alarm(StrEnum):
+    """What raised it."""
+
+    ONE_BURN = "one burn"
+    CUSUM = "cumulated sum"
+    POINTING = "pointing"
+
+
+class WatchedRecord(TypedDict):
+    id: str
+    dv_mps: Number
+    magnitude_error_mps: Number
+    z: Annotated[Number, Doc("of the magnitude, by the model before the burn")]
+    p: Number
+    pointing_p: Number
+    outlier_2_sigma: Annotated[bool, Doc("the paper's first criterion")]
+    model_changes: Annotated[bool, Doc("the second")]
+    followed_by_more: Annotated[bool, Doc("the third")]
+    largest_change_in_sigmas: Number
+    changed: Annotated[str, Doc("the model's most moved parameter")]
+    cusum_low: Annotated[Number, Doc("towards underburns")]
+    cusum_high: Annotated[Number, Doc("towards overburns")]
+    detectable_underburn_mps: Annotated[Number, Doc("raises the alarm by itself in 8 of 10 cases")]
+    detectable_underburn: Annotated[Number, Doc("the same, as a share of the dV")]
+    alarms: Annotated[list[str], Doc("one burn, cumulated sum, pointing")]
+
+
+class GatesWatchRecord(TypedDict):
+    """JSON of `asflown gates watch`."""
+
+    engine: str | None
+    verdict: Annotated[str, Doc("alarm, watch or pass")]
+    first_alarm: str | None
+    burns_before: int
+    against: Annotated[str | None, Doc("model to judge by; null: the burns before")]
+    false_alarm: Annotated[Number, Doc("share of watches as long that raise a false alarm")]
+    limit_p: Annotated[Number, Doc("of one burn")]
+    limit_cusum: Number
+    burns: list[WatchedRecord]
+    shift: Annotated[ShiftRecord | None, Doc("the likeliest change point; null with fewer than three burns")]
 
 
 @dataclass(frozen=True)
 class Watched:
     """One burn against the model before it.  ``z``, ``p`` of the magnitude; ``pointing_p`` None where pointing is not known.
 
-    ``low``, ``high``: cumulated sums towards underburn and overburn after this burn.  ``detectable_mps``: underburn of a burn
-    of this size that alone would have raised the alarm in 8 of 10 cases.  ``change``: by how many of its sigmas the model's
-    most moved parameter changes when the burn is taken in."""
+    ``cusum_low``, ``cusum_high``: cumulated sums towards underburn and overburn after this burn.  ``detectable_mps``: underburn
+    of a burn of this size that alone would have raised the alarm in 8 of 10 cases.  ``change``: by how many of its sigmas the
+    model's most moved parameter changes when the burn is taken in.  ``model``: the one before this burn."""
 
     id: str
     dv_mps: float
@@ -49,23 +112,27 @@ class Watched:
     z: float
     p: float
     pointing_p: float | None
-    low: float
-    high: float
+    cusum_low: float
+    cusum_high: float
     detectable_mps: float
     change: float
     changed: str
-    alarms: tuple[str, ...]
-    follows: bool = False  # a later burn is an outlier too and changes the model: the papers' third criterion
-    foreseen: Foreseen = field(repr=False, default=None)  # type: ignore[assignment]
-    model: Gates = field(repr=False, default=None)  # type: ignore[assignment]  # before this burn
+    alarms: tuple[Alarm, ...]
+    foreseen: Foreseen = field(repr=False)
+    model: Gates = field(repr=False)
+    follows: bool = False  # a later burn is an outlier too and changes the model: the paper's third criterion
 
     @property
     def outlier(self) -> bool:
         return abs(self.z) > _SIGMAS
 
     @property
+    def stands_out(self) -> bool:
+        return self.outlier or bool(self.alarms)
+
+    @property
     def criteria(self) -> tuple[bool, bool, bool]:
-        """The papers' three: outlier of the model before it; the model changes; following ones do likewise."""
+        """The paper's three: outlier of the model before it; the model changes; following ones do likewise."""
         first, second = self.outlier, self.outlier and self.change > _CHANGED
         return first, second, second and self.follows
 
@@ -74,28 +141,42 @@ class Watched:
             "id": self.id, "dv_mps": self.dv_mps, "magnitude_error_mps": self.error_mps, "z": self.z, "p": self.p,
             "pointing_p": self.pointing_p, "outlier_2_sigma": self.criteria[0], "model_changes": self.criteria[1],
             "followed_by_more": self.criteria[2], "largest_change_in_sigmas": self.change, "changed": self.changed,
-            "cusum_low": self.low, "cusum_high": self.high, "detectable_underburn_mps": self.detectable_mps,
+            "cusum_low": self.cusum_low, "cusum_high": self.cusum_high, "detectable_underburn_mps": self.detectable_mps,
             "detectable_underburn": self.detectable_mps / self.dv_mps, "alarms": list(self.alarms),
         }  # fmt: skip
 
+    def row(self) -> tuple[str, ...]:
+        met = " ".join(w for w, said in zip(("outlier", "changes", "followed"), self.criteria, strict=True) if said)
+        seen = f"{1e3 * self.detectable_mps:.2f} mm/s {100 * self.detectable_mps / self.dv_mps:4.1f} %"
+        return (
+            self.id, f"{self.dv_mps:.3g}", f"{1e3 * self.error_mps:.2f}", f"{self.z:.1f}", f"{self.p:.2g}", f"{self.cusum_low:.1f}",
+            f"{self.cusum_high:.1f}", seen, met, f"ALARM ({', '.join(self.alarms)})" if self.alarms else "",
+        )  # fmt: skip
 
-@dataclass(frozen=True)
-class Watch:
-    """A sequence of burns watched; ``limit_p`` of one burn's magnitude or pointing, ``limit_sum`` of the cumulated sums."""
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class GatesWatchResult(Estimate):
+    """A sequence of burns watched; ``limit_p`` of one burn's magnitude or pointing, ``limit_cusum`` of the cumulated sums.
+
+    ``before``: how many burns come before the first that is watched; ``against``: the model to judge by, None for the burns
+    before; ``shift``: the likeliest change point, None with fewer than three burns."""
+
+    RECORD: ClassVar[type] = GatesWatchRecord
+    OLD_KEYS: ClassVar[dict[str, str]] = {"shift.ci95": "shift.share_ci95"}  # which the shift sets itself
 
     engine: str | None
+    maneuvers: Maneuvers
     before: int
     burns: tuple[Watched, ...]
     false_alarm: float
     limit_p: float
-    limit_sum: float
+    limit_cusum: float
     shift: Shift | None
     against: str | None
-    doubts: tuple[str, ...]
 
     @property
     def verdict(self) -> str:
-        """alarm, watch (an outlier, or the papers' criteria met) or pass."""
+        """alarm, watch (an outlier that changes the model, as the paper's criteria say) or pass."""
         if any(b.alarms for b in self.burns):
             return "alarm"
         return "watch" if any(b.criteria[1] for b in self.burns) else "pass"
@@ -104,85 +185,121 @@ class Watch:
     def first_alarm(self) -> str | None:
         return next((b.id for b in self.burns if b.alarms), None)
 
-    def record(self) -> dict:
+    def _record(self) -> dict:
         return {
             "engine": self.engine, "verdict": self.verdict, "first_alarm": self.first_alarm, "burns_before": self.before,
-            "against": self.against, "false_alarm": self.false_alarm, "limit_p": self.limit_p, "limit_cusum": self.limit_sum,
-            "burns": [b.record() for b in self.burns], "shift": None if self.shift is None else self.shift.record(), "doubts": list(self.doubts),
+            "against": self.against, "false_alarm": self.false_alarm, "limit_p": self.limit_p, "limit_cusum": self.limit_cusum,
+            "burns": [b.record() for b in self.burns], "shift": None if self.shift is None else self.shift.record(),
         }  # fmt: skip
 
-    def __str__(self) -> str:
-        lines = [
-            f"{self.verdict.upper()}: {self.engine or 'engine not named'}, {len(self.burns)} burns watched after {self.before}"
-            + (f", by {self.against}" if self.against else "")
-            + (f", first alarm {self.first_alarm}" if self.first_alarm else ""),
-            f"  {'':16s} {'dV m/s':>8s} {'error mm/s':>10s} {'z':>6s} {'p':>8s} {'sums':>11s}  {'seen if short by':>16s}  papers' criteria",
-        ]
-        for b in self.burns:
-            met = " ".join(w for w, said in zip(("outlier", "changes", "followed"), b.criteria, strict=True) if said)
-            lines.append(
-                f"  {b.id:16s} {b.dv_mps:8.3g} {1e3 * b.error_mps:10.2f} {b.z:6.1f} {b.p:8.2g} {b.low:5.1f} {b.high:5.1f}  {1e3 * b.detectable_mps:7.2f} mm/s "
-                f"{100 * b.detectable_mps / b.dv_mps:4.1f} %  {met}"
-                + (f"  ALARM ({', '.join(b.alarms)})" if b.alarms else "")
-            )
-        if self.shift is not None:
-            lines.append(f"  {self.shift}")
-        return "\n".join(line.rstrip() for line in lines)
+    def _tables(self) -> tuple[Table, ...]:
+        title = f"{self.verdict.upper()}: {self.maneuvers.engine_label}, {len(self.burns)} burns watched after {self.before}"
+        title += f", by {self.against}" if self.against else ""
+        title += f", first alarm {self.first_alarm}" if self.first_alarm else ""
+        head = (
+            "burn",
+            "dV [m/s]",
+            "error [mm/s]",
+            "z",
+            "p",
+            "sum low",
+            "sum high",
+            "seen if short by",
+            "paper's criteria",
+        )
+        return (Table(title, tuple(b.row() for b in self.burns), head, (str(self.shift),) if self.shift else ()),)
 
 
-def watch_maneuvers(
-    m: Maneuvers, *, first: str | None = None, against: PastModel | None = None, false_alarm: float = 0.05
-) -> Watch:
-    """Watch the burns from ``first`` on (after the fifteenth, or all where ``against`` gives a model to judge by).
+class _Limits(NamedTuple):
+    p: float  # of one burn's magnitude or pointing
+    cusum: float
 
-    ``against``: read about the biases it left.  ``false_alarm``: share of watches as long that raise a false alarm.
-    Raises BadInput where too few burns come before the first one watched."""
+
+@recorded
+def gates_watch(
+    maneuvers: Maneuvers, *, first: str | None = None, against: PastModel | None = None, false_alarm: float = 0.05
+) -> GatesWatchResult:
+    """Watch each new burn of an engine for degradation.
+
+    Parameters
+    ----------
+    maneuvers : Maneuvers
+        Burns of one engine, in order.
+    first : str, optional
+        Id of the first burn to be watched; the sixteenth unless given, or the first where ``against`` is.
+    against : PastModel, optional
+        A model to judge by, about the biases that it left, in place of the burns before.
+    false_alarm : float
+        Share of watches as long that raise a false alarm.
+
+    Returns
+    -------
+    GatesWatchResult
+
+    Raises
+    ------
+    BadInput
+        Where fewer than 15 burns come before the first one watched, or the rate is none.
+    """
+    m = maneuvers
     if not 0 < false_alarm < 1:
         raise BadInput(
-            f"a false-alarm rate of {false_alarm:g} is none", remedy="Give a share between 0 and 1, as in 0.05."
+            f"the false-alarm rate {false_alarm:g} does not lie between 0 and 1", remedy="Give a share, as in 0.05."
         )
+    start = _start(m, first, against)
+    share = false_alarm / (2 if m.pointing_error_mps is None else 3)
+    limits = _Limits(float(-np.expm1(np.log1p(-share) / (len(m) - start))), cusum_limit(len(m) - start, share / 2))
+    burns = _followed(_watched(m, start, against, limits))
+    errors = m.magnitude_error_mps[start:]
+    return GatesWatchResult(
+        method="burns before" if against is None else "model",
+        engine=m.engine_name,
+        maneuvers=m,
+        before=start,
+        burns=tuple(burns),
+        false_alarm=false_alarm,
+        limit_p=limits.p,
+        limit_cusum=limits.cusum,
+        shift=find_shift([b.id for b in burns], m.dv_mps[start:], errors, [b.foreseen for b in burns]),
+        against=None if against is None else against.model.name,
+        doubts=Doubts(_doubts(m, burns, against)),
+    )
+
+
+def _start(m: Maneuvers, first: str | None, against: PastModel | None) -> int:
+    """The first burn to be watched."""
     start = m.place(first) if first is not None else 0 if against is not None else FEWEST_BEFORE
     if against is None and (start < FEWEST_BEFORE or start >= len(m)):
         raise BadInput(
             f"{min(start, len(m))} burns come before the first to be watched; a model takes {FEWEST_BEFORE}, and one burn to judge by it",
             file=m.source or None, remedy="Watch from a later burn on (--from), or judge by a model (--against).",
         )  # fmt: skip
-    count = len(m) - start
-    pointed = m.pointing_error_mps is not None
-    share = false_alarm / (3 if pointed else 2)
-    limit_p = -np.expm1(np.log1p(-share) / count)
-    limit_sum = cusum_limit(count, share / 2)  # a sum on each side
+    return start
+
+
+def _watched(m: Maneuvers, start: int, against: PastModel | None, limits: _Limits) -> list[Watched]:
+    """Every burn from ``start`` on; those that raise the alarm do not enter the next ones' model, and the sums begin anew."""
     kept = np.ones(len(m), bool)
     low = high = 0.0
-    burns: list[Watched] = []
+    burns = []
     for k in range(start, len(m)):
-        rows = np.flatnonzero(kept[:k])
-        told, across, change, model = _foretold(m, rows, k, against)
-        error = m.magnitude_error_mps[k]
+        told, across, (change, changed), model = _foretold(m, np.flatnonzero(kept[:k]), k, against)
+        error = float(m.magnitude_error_mps[k])
         score, p = told.score(error), told.p_value(error)
         low, high = max(0.0, low - score - _REFERENCE), max(0.0, high + score - _REFERENCE)
         pointing_p = None if across is None else across.p_value(m.across[0][k])
-        alarms = [w for w, said in (
-            ("one burn", p < limit_p), ("cumulated sum", max(low, high) > limit_sum),
-            ("pointing", pointing_p is not None and pointing_p < limit_p),
-        ) if said]  # fmt: skip
+        alarms = tuple(a for a, raised in (
+            (Alarm.ONE_BURN, p < limits.p), (Alarm.CUSUM, max(low, high) > limits.cusum),
+            (Alarm.POINTING, pointing_p is not None and pointing_p < limits.p),
+        ) if raised)  # fmt: skip
         burns.append(Watched(
-            m.id[k], float(m.dv_mps[k]), float(error), told.z(error), p, pointing_p, low, high, detectable(told, limit_p), change[0], change[1],
-            tuple(alarms),
-            foreseen=told, model=model,
+            m.id[k], float(m.dv_mps[k]), error, told.z(error), p, pointing_p, low, high, detectable(told, limits.p), change, changed,
+            alarms, told, model,
         ))  # fmt: skip
         if alarms:
             low = high = 0.0
             kept[k] = False
-    burns = _followed(burns)
-    shift = find_shift(
-        [b.id for b in burns], m.dv_mps[start:], m.magnitude_error_mps[start:], [b.foreseen for b in burns]
-    )
-    name = None if against is None else against.model.name
-    engine = m.engine[0] if m.engines != [""] else None
-    return Watch(
-        engine, start, tuple(burns), false_alarm, float(limit_p), limit_sum, shift, name, tuple(_doubts(m, burns, against))
-    )  # fmt: skip
+    return burns
 
 
 def _foretold(m: Maneuvers, rows, k: int, against: PastModel | None):
@@ -193,15 +310,11 @@ def _foretold(m: Maneuvers, rows, k: int, against: PastModel | None):
         across = None if across_od is None else foresee_by(against.left, v, across_od)
         return foresee_by(against.left, v, od), across, (0.0, ""), against.left
     prior = problems(m.take(rows))
-    points = {name: p.minimum() for name, p in prior.items()}
-    told = foresee(prior["magnitude"], points["magnitude"], v, od)
-    across = foresee(prior["pointing"], points["pointing"], v, across_od) if "pointing" in prior else None
-    before, after = points["magnitude"], problems(m.take([*rows, k]))["magnitude"].minimum()
-    spread = _sigmas(prior["magnitude"], before)
-    moved = (
-        np.abs([after.fixed - before.fixed, after.proportional - before.proportional, *(after.beta - before.beta)])
-        / spread
-    )
+    points = {quantity: p.minimum() for quantity, p in prior.items()}
+    before, after = points[MAGNITUDE], problems(m.take([*rows, k]))[MAGNITUDE].minimum()
+    told = foresee(prior[MAGNITUDE], before, v, od)
+    across = foresee(prior[POINTING], points[POINTING], v, across_od) if POINTING in prior else None
+    moved = np.abs(after.values - before.values) / _sigmas(prior[MAGNITUDE], before)
     names = ("fixed sigma", "proportional sigma", "fixed bias", "proportional bias")
     most = int(np.argmax(moved))
     model = Gates(before.fixed, before.proportional, np.nan, np.nan, *before.beta, name=f"{len(rows)} burns before")
@@ -246,13 +359,13 @@ def cusum_limit(steps: int, share: float) -> float:
     return float(optimize.brentq(lambda h: passed(h) - share, 0.3, 30.0, xtol=1e-4))
 
 
-def _doubts(m: Maneuvers, burns: list[Watched], against: PastModel | None):
-    yield from m.doubts
-    blind = [b.id for b in burns if b.detectable_mps > 0.1 * b.dv_mps]
+def _doubts(m: Maneuvers, burns: list[Watched], against: PastModel | None) -> Iterator[Doubt]:
+    yield from m.doubts.passed_on_by("maneuvers")
+    blind = [b.id for b in burns if b.detectable_mps > _SHOULD_SHOW * b.dv_mps]
     if blind:
-        some = ", ".join(blind[:6]) + (f" and {len(blind) - 6} more" if len(blind) > 6 else "")
-        yield f"too small to show an underburn of a tenth: {some}"
+        yield TOO_SMALL(percent=100 * _SHOULD_SHOW, burns=blind)
     if against is not None:
-        yield f"judged by {against.model.name}, about the biases it left: as good as that model is for these burns"
+        yield from against.doubts.passed_on_by("model")
+        yield JUDGED_BY_MODEL(model=against.model.name)
     if m.tai_ns is None:
-        yield "without times the burns are taken in the file's order"
+        yield NO_TIMES()

@@ -1,10 +1,11 @@
-"""The inertia tensor from slews, what the slews cannot tell, and which slew would tell it."""
+"""The inertia tensor from slews, what the slews cannot identify, and which slew would."""
 
-from .plan import plan_slew, what_was_flown
-from .prediction import compared_history
+from .history import InertiaHistoryResult, InertiaWindow, inertia_history
+from .plan import PlannedTurn, SlewPlanResult, slew_plan
 from .result import InertiaResult
-from .tensor import inertia_tensor
+from .tensor import inertia
 
 __all__ = [
-    "InertiaResult", "compared_history", "inertia_tensor", "plan_slew", "what_was_flown",
+    "InertiaHistoryResult", "InertiaResult", "InertiaWindow", "PlannedTurn", "SlewPlanResult", "inertia",
+    "inertia_history", "slew_plan",
 ]  # fmt: skip

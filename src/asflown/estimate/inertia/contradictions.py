@@ -1,4 +1,4 @@
-"""What may be wrong where momentum is not conserved: the mistakes that telemetry is known for, tried one by one."""
+"""What may be wrong where momentum is not conserved: common mistakes in telemetry, tried one by one."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ import numpy as np
 from scipy import ndimage
 
 from ...dynamics.rigid_body import tensor_of
+from ...kit.doubts import Doubts, Kind, Severity
 from ...kit.errors import BadInput
 from ...kit.regression import memory
 from ...kit.rotations import rotation
+from ...kit.scatter import robust_sigma
 from ...telemetry.attitude import MISTAKEN_UNITS
 from .motion import Layout, first_motion
 from .plain import plain_fit
@@ -25,45 +27,49 @@ if TYPE_CHECKING:
 
 #: Momentum left over, as a share of what the wheels' varies by, from which mistakes are looked for.
 _TOO_MUCH = 0.02
-#: A step of momentum is plain where it takes this much off the squared residuals, in their own variance.
+#: A step of momentum is plain where it takes this much off the squared residuals, in their own variance.  More than is asked of
+#: one in the whole motion's own covariance (consistent._STEP_KEPT): here motion is rough, and the variance that of quick residuals.
 _STEP_SEEN = 60.0
 MOST_STEPS = 5
 #: A mistake is named where mending it takes away this much of what is left over (rms).
 _MENDED = 5.0
 
+WANDERS = Kind(
+    "inertia.momentum-wanders", Severity.SUSPECT,
+    "momentum is not conserved to {percent:.0f} % of the variation of the wheels': external torques vary. Method consistent models "
+    "the total momentum as a random walk, so that only quick exchanges between wheels and body inform the tensor",
+    "Check wheel axes, spin inertia and units where external torques are known to be small.",
+)  # fmt: skip
 
-def conserved(record: SlewRecord, slews: list[Slew], source: str | None) -> tuple[SlewRecord, list[float], bool]:
-    """The record, its arcs parted where the momentum plainly steps (when, seconds of the record), and whether its momentum
-    is conserved then.
+
+def conserved(record: SlewRecord, slews: list[Slew], source: str | None) -> SlewRecord:
+    """The record with its arcs parted where the momentum plainly steps; it wanders where it is not conserved even then.
 
     Raises BadInput, naming the likeliest mistake, where another reading of the data conserves it far better.  Tried: the
     quaternion in the other direction, rates in another unit where no attitude shows it, one wheel turning the other
     way, two wheels mistaken for each other, in all of the record or after one of its slews."""
-    layout = Layout.of(record)
-    left = plain_fit(record, layout, np.zeros(layout.size), 0.0)[1]
+    left = plain_fit(record)[1]
     limit = _TOO_MUCH**2 * _variance(record) * len(record.momentum.time_s)
     if left <= limit:
-        return record, [], True
-    tried = {what: plain_fit(other, layout, np.zeros(layout.size), 0.0)[1] for what, other in _others(record, slews)}
+        return record
+    tried = {what: plain_fit(other)[1] for what, other in _others(record, slews)}
     best = min(tried, key=lambda w: tried[w], default=None)
     if best is not None and tried[best] * _MENDED**2 < left:
         raise BadInput(
             f"momentum is not conserved, and would be {np.sqrt(left / max(tried[best], 1e-300)):.0f} times better if {best}",
             file=source,
-            remedy="Mend the column names and units, the craft's wheel axes or the quaternion's direction, or leave the span out "
+            remedy="Correct the column names and units, the craft's wheel axes or the quaternion's direction, or leave the span out "
             "(--start, --stop).",
         )
     parted = record
-    steps: list[float] = []
-    while len(steps) < MOST_STEPS:
+    for _ in range(MOST_STEPS):
         at = _step_of_momentum(*_residual(parted))
         if at is None:
             break
-        parted, steps = parted.split_at(at), [*steps, at]
-        layout = Layout.of(parted)
-        if plain_fit(parted, layout, np.zeros(layout.size), 0.0)[1] <= limit:
-            return parted, steps, True
-    return record, [], False
+        parted = parted.split_at(at)
+        if plain_fit(parted)[1] <= limit:
+            return parted
+    return replace(record, wanders=True, doubts=Doubts([*record.doubts, WANDERS(percent=100 * _TOO_MUCH)]))
 
 
 def _variance(record: SlewRecord) -> float:
@@ -75,21 +81,21 @@ def _variance(record: SlewRecord) -> float:
 def _residual(record: SlewRecord):
     """What plain least squares leaves over: time (N,), momentum (N, 3), inertial axes, and arc (N,)."""
     layout, m = Layout.of(record), record.momentum
-    beta, _ = plain_fit(record, layout, np.zeros(layout.size), 0.0)
+    beta, _ = plain_fit(record)
     times, held, index = m.vectors(m.value_Nms)
     motion = first_motion(record, times)
     r = rotation(motion.q_NB)
     arc = np.zeros(len(times), int)
     arc[index] = m.arc
-    starts = beta[6 : 6 + 3 * layout.arcs].reshape(layout.arcs, 3)
-    return times, r.apply(held + motion.omega_B @ tensor_of(beta[layout.TENSOR])) - starts[arc], arc
+    total = r.apply(held + motion.omega_B @ tensor_of(beta[layout.TENSOR]))
+    return times, total - layout.momenta(beta)[arc], arc
 
 
 def _step_of_momentum(time_s: np.ndarray, residual_N: np.ndarray, arc: np.ndarray) -> float | None:
     """Where one step would take most off a residual momentum (N, 3), inertial axes, if it is plain. [s]"""
     quick = residual_N - ndimage.median_filter(residual_N, size=(31, 1), mode="nearest")  # without the step itself
     noise = np.sqrt(max(memory(column) for column in quick.T))  # neighbours that err alike are worth less
-    noise *= 1.4826 * np.median(np.abs(quick))
+    noise *= robust_sigma(quick)
     best, at = _STEP_SEEN, None
     for k in np.unique(arc):
         here = np.flatnonzero(arc == k)

@@ -1,11 +1,11 @@
-"""What the turning of a body can tell of its inertia tensor (001 eqs 9-11).
+"""Which parts of its inertia tensor a body's turns identify (Feldman and Lee eqs 9-11).
 
 Momentum of the body is I w, linear in the six components of I: one row of three for each instant, stacked in a
-matrix S (3N x 6).  Which components can be had depends on the directions of w alone: one direction gives a row of
+matrix S (3N x 6).  Which components are identifiable depends on the directions of w alone: one direction gives a row of
 the tensor (rank 3, whether it is a body axis or a skew one), two give all but the moment about the normal of their
 plane (rank 5, however many turns there are in that plane), three give all (rank 6).
 
-001 states the condition as "the rank of S is 3Ns"; S has six columns, and it must be 6 (docs/errata.md).
+The paper states the condition as "the rank of S is 3Ns"; S has six columns, and it must be 6 (docs/errata.md).
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ _PLACE = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 FRACTION = 0.025
 #: ... and than this many times the noise of a rate sample, which by itself makes 1.
 _ABOVE_NOISE = 2.0
-#: A component that shares less than this with what is not told is told; one that shares all but as little is not.
+#: A component is identifiable where it shares less than this with the directions in the null space, and not identifiable where
+#: it shares all but as little.
 _FREE = 0.1
 _RANK = (0, 3, 5, 6)  # by directions that count
 _COUNTED = ("no direction", "one direction", "two directions", "three directions")
@@ -38,16 +39,16 @@ _COUNTED = ("no direction", "one direction", "two directions", "three directions
 class Excitation:
     """How well a record of body rates shows each part of the inertia tensor.
 
-    ``singular_values``: (6,) of S / sqrt(N), falling [rad/s].  ``told``, ``untold``: names of components, and words
-    for combinations where the directions are not body axes.  ``directions``: (3, 3), rows, body axes, and
-    ``rate_rms``: (3,), the rate about each, falling [rad/s]."""
+    ``singular_values``: (6,) of S / sqrt(N), falling [rad/s].  ``identifiable``, ``not_identifiable``: names of components, and
+    words for combinations where the directions are not body axes.  ``directions``: (3, 3), rows, body axes, and
+    ``rate_rms_rad_s``: (3,), the rate about each, falling."""
 
     rank: int
     singular_values: np.ndarray
-    told: tuple[str, ...]
-    untold: tuple[str, ...]
+    identifiable: tuple[str, ...]
+    not_identifiable: tuple[str, ...]
     directions: np.ndarray
-    rate_rms: np.ndarray
+    rate_rms_rad_s: np.ndarray
 
     @property
     def seen(self) -> np.ndarray:
@@ -55,35 +56,14 @@ class Excitation:
         counted = self.directions[: _RANK.index(self.rank)]
         return counted.T @ counted
 
-    def sentences(self) -> list[str]:
-        """What can and what cannot be told, in words."""
-        rates = ", ".join(f"{1e3 * r:.2g}" for r in self.rate_rms)
-        counted = _COUNTED[_RANK.index(self.rank)]
-        if self.rank == 6:
-            return [f"the turns tell all six components of the inertia tensor (rates rms {rates} mrad/s, rank 6)"]
-        if self.rank == 0:
-            return [
-                f"the craft hardly turns (rates rms {rates} mrad/s): nothing is told of the inertia tensor (rank 0)"
-            ]
-        return [
-            f"the craft turns about {counted} only (rates rms {rates} mrad/s), so that the rank is {self.rank} of 6",
-            f"told: {', '.join(self.told)}",
-            f"not told: {', '.join(self.untold)}",
-        ]
-
-    def record(self) -> dict:
-        return {
-            "rank": self.rank,
-            "singular_values": self.singular_values,
-            "told": list(self.told),
-            "untold": list(self.untold),
-            "directions": self.directions,
-            "rate_rms_rad_s": self.rate_rms,
-        }
+    @property
+    def counted(self) -> str:
+        """'no direction', 'one direction', …: about how many the body turns."""
+        return _COUNTED[_RANK.index(self.rank)]
 
 
 def excitation(omega_B, sigma_rad_s: float = 0.0) -> Excitation:
-    """Rank and singular values of 001 eq 11's S from body rates (N, 3) [rad/s]; rows that are not finite do not count.
+    """Rank and singular values of S (Feldman and Lee eq 11) from body rates (N, 3) [rad/s]; rows that are not finite do not count.
 
     ``sigma_rad_s``: noise of a rate sample, which must not pass for turning.
     Raises BadInput where there is no sample."""
@@ -97,11 +77,11 @@ def excitation(omega_B, sigma_rad_s: float = 0.0) -> Excitation:
     directions = np.array([_pointed(v) for v in vectors.T[::-1]])
     counted = int(np.sum(rms > max(FRACTION * rms[0], _ABOVE_NOISE * sigma_rad_s)))
     singular = np.sqrt(np.maximum(np.linalg.eigvalsh(normal_matrix(square))[::-1], 0.0))
-    return Excitation(_RANK[counted], singular, *_told(directions, counted), directions, rms)
+    return Excitation(_RANK[counted], singular, *_identifiable(directions, counted), directions, rms)
 
 
 def normal_matrix(square, weights=(1.0, 1.0, 1.0)) -> np.ndarray:
-    """S^T W S (6, 6) from the sum of w w^T (3, 3): each row of the tensor meets the same rates.  001 eqs 10, 11
+    """S^T W S (6, 6) from the sum of w w^T (3, 3): each row of the tensor meets the same rates (Feldman and Lee eqs 10, 11).
 
     ``weights``: of the momentum about x, y and z."""
     out = np.zeros((6, 6))
@@ -110,8 +90,8 @@ def normal_matrix(square, weights=(1.0, 1.0, 1.0)) -> np.ndarray:
     return out
 
 
-def _told(directions, counted: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of what is told and of what is not, from the directions (rows) of which the first few count."""
+def _identifiable(directions, counted: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of what is identifiable and of what is not, from the directions (rows) of which the first few count."""
     blind = directions[counted:]
     if not len(blind):
         return ELEMENTS, ()
@@ -119,17 +99,17 @@ def _told(directions, counted: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
     hidden = [elements_of(np.outer(u, v) + np.outer(v, u)) for u, v in combinations_with_replacement(blind, 2)]
     basis, _ = np.linalg.qr(np.array(hidden).T)
     share = np.linalg.norm(basis, axis=1)
-    told = tuple(n for n, s in zip(ELEMENTS, share, strict=True) if s < _FREE)
-    untold = tuple(n for n, s in zip(ELEMENTS, share, strict=True) if s > np.sqrt(1 - _FREE**2))
-    if len(untold) == len(hidden):
-        return told, untold
+    known = tuple(n for n, s in zip(ELEMENTS, share, strict=True) if s < _FREE)
+    unknown = tuple(n for n, s in zip(ELEMENTS, share, strict=True) if s > np.sqrt(1 - _FREE**2))
+    if len(unknown) == len(hidden):
+        return known, unknown
     mixed = ", ".join(n for n, s in zip(ELEMENTS, share, strict=True) if s >= _FREE)
     if counted == 2:
-        return told, (f"the moment about {named(blind[0])}, which mixes {mixed}",)
+        return known, (f"the moment about {named(blind[0])}, which mixes {mixed}",)
     axis = named(directions[0])
     return (
-        (*told, f"the moment about {axis} and its products with the axes across"),
-        (*untold, f"both moments and the product across {axis}, which mix {mixed}"),
+        (*known, f"the moment about {axis} and its products with the axes across"),
+        (*unknown, f"both moments and the product across {axis}, which mix {mixed}"),
     )
 
 

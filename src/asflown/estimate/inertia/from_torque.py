@@ -14,24 +14,93 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from ...dynamics.environment import gravity_gradient_regressor
-from ...dynamics.rigid_body import ELEMENTS, momentum_regressor
+from ...dynamics.rigid_body import ELEMENTS, elements_of, momentum_regressor, tensor_of
+from ...kit.doubts import Doubts, Kind, Severity
 from ...kit.errors import BadInput
 from ...kit.rotations import rotation
 from ...kit.timeline import seconds_since, segments
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
-from ...telemetry.telemetry import BRIDGED, Telemetry
+from ...telemetry.telemetry import BRIDGED
+from .excitation import Excitation
+from .prior import MOMENT_SHARE, PRODUCT_SHARE, possible, prior_sigma
+from .result import Answer, Evidence
+
+if TYPE_CHECKING:
+    from ...telemetry.telemetry import Telemetry
+    from ..subject import Subject
 
 #: Lengths of the blocks over which both sides are averaged; the first gives the answer, all of them its sigma. [s]
 BLOCKS_S = (60.0, 120.0, 240.0)
 #: Residuals are taken to be independent beyond this: what is not modelled changes over a good part of an orbit. [s]
 _ALIKE_S = 1800.0
 _FEWEST_ROWS = 20
+
+COMMANDED_TORQUE = Kind(
+    "inertia.commanded-torque", Severity.CAUTION,
+    "only the commanded torque of the actuators is telemetered: a momentum balance over blocks, with the gravity gradient, is used",
+    "Add wheel_rate_<WHEEL> or wheel_momentum_x|y|z.",
+)  # fmt: skip
+NOT_BY_DATA = Kind(
+    "inertia.not-by-data", Severity.CAUTION,
+    "the data alone do not identify {elements} to {moment_percent:.0f} % (products to {product_percent:.1f} % of the mean moment): "
+    "blocks of {blocks} s give {estimates} kg m2. Their values rest on the craft's own tensor",
+    "Take a record with slews.",
+)  # fmt: skip
+
+
+def by_torque(subject: Subject) -> Answer:
+    """The balance, with the craft's own tensor as prior.  Raises BadInput where that is not known."""
+    I_B = subject.known_inertia()
+    found, sigma = balance(subject.telemetry), prior_sigma(I_B)
+    known, unknown = identifiable(found, sigma)
+    size = np.sqrt(np.diag(found.covariance))
+    prior = np.append(size[:6] / sigma, np.zeros(3)) ** 2  # information, in units of the data's own sigmas
+    information = np.linalg.inv(found.covariance / np.outer(size, size))
+    covariance = np.linalg.inv(information + np.diag(prior))
+    centre = np.append(elements_of(I_B), np.zeros(3)) / size
+    beta = size * (covariance @ (information @ (found.solution / size) + prior * centre))
+    covariance = covariance * np.outer(size, size)
+    elements, impossible = possible(beta[:6], np.linalg.inv(covariance[:6, :6]))
+    excited = Excitation(
+        len(known), np.full(6, np.nan), known, unknown, np.eye(3), np.sqrt(np.mean(found.omega_B**2, axis=0))
+    )
+    evidence = Evidence(
+        found.time_s, found.omega_B, np.cumsum(found.pushed_Nms, axis=0), found.residual_Nms, np.ones(len(found.time_s), bool)
+    )  # fmt: skip
+    doubts = [*subject.doubts, COMMANDED_TORQUE(), *_not_by_data(found, unknown), *impossible]
+    return Answer(
+        method="momentum balance",
+        elements=elements,
+        covariance=covariance[:6, :6],
+        by_scale=np.stack([tensor_of(beta[:6]), -tensor_of(beta[:6])]),  # of the torque, and of the rates
+        excitation=excited,
+        torque_Nm=beta[6:],
+        torque_sigma_Nm=np.sqrt(np.diag(covariance)[6:]),
+        frame="body",
+        evidence=evidence,
+        settings={"by_block_kgm2": {f"{b:g}": v for b, v in found.by_block.items()}},
+        doubts=doubts,
+    )
+
+
+def _not_by_data(found: Balance, unknown: tuple[str, ...]) -> Doubts:
+    if not unknown:
+        return Doubts()
+    each = "; ".join(
+        f"{n} {', '.join(f'{v[k]:.3g}' for v in found.by_block.values())}"
+        for k, n in enumerate(ELEMENTS)
+        if n in unknown
+    )
+    blocks = ", ".join(f"{b:g}" for b in found.by_block)
+    share = {"moment_percent": 100 * MOMENT_SHARE, "product_percent": 100 * PRODUCT_SHARE}
+    return Doubts([NOT_BY_DATA(elements=unknown, blocks=blocks, estimates=each, **share)])
 
 
 @dataclass(frozen=True)
@@ -146,8 +215,8 @@ def _orbit_angle(position) -> np.ndarray:
     return np.arctan2(r @ across, r @ r[0])
 
 
-def told(found: Balance, sigma: np.ndarray) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Elements that the balance alone knows better than to these sigmas (6,), and those that it does not."""
+def identifiable(found: Balance, sigma: np.ndarray) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Elements that the balance alone knows better than these sigmas (6,), and those that it does not."""
     alone = np.sqrt(np.diag(found.covariance)[:6])
     known = tuple(n for n, s, limit in zip(ELEMENTS, alone, sigma, strict=True) if s < limit)
     return known, tuple(n for n in ELEMENTS if n not in known)

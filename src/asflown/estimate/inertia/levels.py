@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...kit.regression import third_difference_sigma
 from ...kit.rotations import rotation
+from ...kit.scatter import difference_sigma
 
 if TYPE_CHECKING:
     from .record import SlewRecord
@@ -19,13 +19,13 @@ def first_levels(record: SlewRecord) -> Levels:
     m, g, a = record.momentum, record.rates, record.attitude
     d = m.direction.round(9)
     of = [np.flatnonzero((d == u).all(axis=1)) for u in np.unique(d, axis=0)]
-    wheel = _median([third_difference_sigma(m.value_Nms[i] / m.unit[i] * np.sqrt(m.count[i])) for i in of], 1e-2)
-    rate = _median([third_difference_sigma((g.value_rad_s * np.sqrt(g.count))[g.axis == j]) for j in range(3)], 1e-6)
+    wheel = _median([difference_sigma(m.value_Nms[i] / m.unit[i] * np.sqrt(m.count[i]), 3) for i in of], 1e-2)
+    rate = _median([difference_sigma((g.value_rad_s * np.sqrt(g.count))[g.axis == j], 3) for j in range(3)], 1e-6)
     attitude = 1e-5
     if record.has_attitude:
         r = rotation(a.q_NB)
         steps = (r[:-1].inv() * r[1:]).as_rotvec() * np.sqrt(a.count[1:, None])
-        attitude = _median([third_difference_sigma(np.cumsum(step)) for step in steps.T], 1e-5)
+        attitude = _median([difference_sigma(np.cumsum(step), 3) for step in steps.T], 1e-5)
     jerk = np.median(np.abs(g.value_rad_s)) * 1e-3 + 1e-9 if record.has_rates else 1e-6
     return Levels(max(wheel, 1e-9), max(rate, 1e-12), max(attitude, 1e-9), max(attitude, 1e-9), 15.0, float(jerk))
 

@@ -15,34 +15,47 @@ if TYPE_CHECKING:
     from .record import SlewRecord
 
 
-def plain_fit(
-    record: SlewRecord, layout: Layout, beta: np.ndarray, skew: float, quick: bool = False
-) -> tuple[np.ndarray, float]:
-    """Tensor and momenta by least squares of momentum alone, wheels ``skew`` s later: beta and the squares left over.
+def plain_fit(record: SlewRecord, beta: np.ndarray | None = None, skew_s: float = 0.0) -> tuple[np.ndarray, float]:
+    """Tensor and momenta by least squares of momentum alone, wheels ``skew_s`` later: beta, and the squares left over.
 
-    ``quick``: of its changes from one reading to the next, in which outside torques hardly show."""
-    beta = beta.copy()
-    beta[layout.skew_wheels] = skew
+    ``beta``: constants to start from, of which the rates' time offset counts; zeros unless given."""
+    beta, columns, value = _equations(record, beta, skew_s)
+    return _solved(beta, columns, value, rounds=3)  # a few wild readings must not decide where the fit starts
+
+
+def fit_of_changes(record: SlewRecord, beta: np.ndarray, skew_s: float) -> tuple[np.ndarray, float]:
+    """The same from changes of momentum between successive readings, in which external torques hardly show."""
+    beta, columns, value = _equations(record, beta, skew_s)
     m = record.momentum
-    times = np.unique(m.time_s + skew)
-    motion = first_motion(_shifted(record, layout, beta), times)
-    k = np.searchsorted(times, m.time_s + skew)
+    order = np.lexsort((m.time_s, *m.direction.T, m.arc))
+    same = (m.direction[order[1:]] == m.direction[order[:-1]]).all(axis=1) & (np.diff(m.arc[order]) == 0)
+    return _solved(beta, np.diff(columns[order], axis=0)[same], np.diff(value[order])[same], rounds=1)
+
+
+def _equations(record: SlewRecord, beta: np.ndarray | None, skew_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """beta with the wheels' offset put in; columns of tensor and momenta (M, 6 + 3 arcs), and momentum (M,)."""
+    layout = Layout.of(record)
+    beta = np.zeros(layout.size) if beta is None else beta.copy()
+    beta[layout.skew_wheels] = skew_s
+    m = record.momentum
+    times = np.unique(m.time_s + skew_s)
+    motion = first_motion(shifted(record, beta), times)
+    k = np.searchsorted(times, m.time_s + skew_s)
     columns = np.zeros((len(k), 6 + 3 * layout.arcs))
     columns[:, :6] = -np.einsum("ni,nik->nk", m.direction, momentum_regressor(motion.omega_B[k]))
     inertial = rotation(motion.q_NB[k]).apply(m.direction)
     for arc in range(layout.arcs):
         here = m.arc == arc
         columns[here, layout.momentum(arc)] = inertial[here]
-    value = m.value_Nms
-    if quick:
-        order = np.lexsort((m.time_s, *m.direction.T, m.arc))
-        same = (m.direction[order[1:]] == m.direction[order[:-1]]).all(axis=1) & (np.diff(m.arc[order]) == 0)
-        value = np.diff(value[order])[same]
-        columns = np.diff(columns[order], axis=0)[same]
+    return beta, columns, m.value_Nms
+
+
+def _solved(beta: np.ndarray, columns: np.ndarray, value: np.ndarray, *, rounds: int) -> tuple[np.ndarray, float]:
+    """Least squares; after each round outliers are left out."""
     size = np.sqrt(np.sum(columns**2, axis=0))
     size[size == 0] = 1.0
     good = np.ones(len(value), bool)
-    for _ in range(1 if quick else 3):  # a few wild readings must not decide where the fit starts
+    for _ in range(rounds):
         found, *_ = np.linalg.lstsq(columns[good] / size, value[good], rcond=1e-6)
         left = value - columns @ (found / size)
         good = np.abs(left) <= 8 * np.median(np.abs(left)) + 1e-300
@@ -50,8 +63,9 @@ def plain_fit(
     return beta, float(np.sum(left[good] ** 2))
 
 
-def _shifted(record: SlewRecord, layout: Layout, beta) -> SlewRecord:
-    """Rates at mended times."""
-    if layout.skew_rates is None or beta[layout.skew_rates] == 0:
+def shifted(record: SlewRecord, beta: np.ndarray) -> SlewRecord:
+    """The record with the rates' time stamps corrected."""
+    skew = Layout.of(record).skew_rates
+    if skew is None or beta[skew] == 0:
         return record
-    return replace(record, rates=replace(record.rates, time_s=record.rates.time_s + beta[layout.skew_rates]))
+    return replace(record, rates=replace(record.rates, time_s=record.rates.time_s + beta[skew]))

@@ -6,30 +6,37 @@ with them, which takes the mean off.  That the body turns meanwhile is left out:
 25 degrees sigmas are too large by up to 7 %.
 
 Chosen is the direction with the smallest determinant of the posterior covariance (D-optimal: the same whatever the
-axes and units), starting from a prior of 001's requirement, 10 % on moments and 75 kg m2 on products, one sigma each.
+axes and units), starting from a prior of Feldman and Lee's requirement, 10 % on moments and 75 kg m2 on products, one
+sigma each.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.rigid_body import ELEMENTS
+from ...kit.digits import scaled_unit
+from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput
 from ...kit.regression import noise_sigma
-from ...kit.timeline import NS, cadence_ns, seconds_since
+from ...kit.result import Estimate, per_spin_inertia, recorded
+from ...kit.schema import Annotated, Doc, NotRequired, Number, TypedDict, Vector
+from ...kit.table import Table
+from ...kit.timeline import NS, cadence_ns, seconds_since, utc_to_tai_ns
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
 from ..subject import subject_of
 from .excitation import excitation, named, normal_matrix
-from .prior import prior_sigma
+from .prior import PRODUCT_SHARE, prior_sigma
 
 if TYPE_CHECKING:
     from ...craft.model import Craft, CraftAt
     from ...telemetry.telemetry import Channel, Telemetry
+    from ..subject import Subject
 
 #: Nominal noise of a sample of body and wheel rate. [rad/s]
 RATE_SIGMA, WHEEL_SIGMA = 2e-6, 0.005
@@ -37,163 +44,276 @@ RATE_SIGMA, WHEEL_SIGMA = 2e-6, 0.005
 _DIRECTIONS = 2000  # over the sphere: neighbours 4 degrees apart
 _SLOWER = np.linspace(1.0, 0.05, 20)  # rates tried, as shares of that wanted
 _HOLD_S = 60.0
+_CADENCE_S = 4.0  # of the samples of a plan from nothing
 _NOISE_WINDOW = 5.0  # half-width of the fits whose residuals are the rates' noise, in samples
+
+NOISE_ONLY = Kind(
+    "inertia.plan-noise-only", Severity.CAUTION,
+    "the sigmas include noise only: scale errors of the spin inertia and of the gyros add 0.2 to 1 %",
+)  # fmt: skip
+RATIOS_ONLY = Kind(
+    "inertia.plan-ratios-only", Severity.NOTE,
+    "the wheels' spin inertia is not known: sigmas are per unit spin inertia, and the prior of products is {product_percent:.1f} % "
+    "of the mean moment", "Give the wheels' spin_inertia in the craft file.",
+)  # fmt: skip
+LIMIT_UNKNOWN = Kind(
+    "inertia.plan-limit-unknown", Severity.CAUTION,
+    "the {limit} of the wheels is not in the craft file: the turn may exceed what they can give",
+    "Add it to the [[wheels]] of the craft file.",
+)  # fmt: skip
+NO_TURN_ABOUT = Kind(
+    "inertia.plan-no-turn", Severity.NOTE, "no turn about {axes} fits the wheels' limits, however slow",
+    "Plan a smaller --angle.",
+)  # fmt: skip
+
+
+class TurnRecord(TypedDict):
+    axis: Annotated[Vector, Doc("body axes, in the sense of the turn")]
+    angle_rad: Number
+    rate_rad_s: Annotated[Number, Doc("largest; less than asked where wheels or angle do not allow it")]
+    acceleration_rad_s2: Number
+    duration_s: Number
+    limited_by_wheels: bool
+    gain_nats: Annotated[Number, Doc("half the fall of the log determinant of the covariance")]
+    rank: int
+    inertia_sigma_kgm2: Annotated[dict[str, Number] | None, Doc("what the turn would leave, by element")]
+    inertia_sigma_per_spin_inertia: NotRequired[dict[str, Number]]
+
+
+class SlewPlanRecord(TypedDict):
+    """JSON of `asflown inertia plan`.  Where the wheels' spin inertia is unknown the keys in kg m2 and N m s are null and their
+    siblings per unit spin inertia hold the values."""
+
+    craft: str
+    criterion: str
+    unit: Annotated[str, Doc("kg m2, or per spin inertia")]
+    rank_before: int
+    inertia_sigma_before_kgm2: Annotated[dict[str, Number] | None, Doc("by element")]
+    best: TurnRecord
+    others: list[TurnRecord]
+    momentum_sigma_Nms: Annotated[Vector | None, Doc("noise of a sample")]
+    rate_sigma_rad_s: Annotated[Number, Doc("noise of a sample of body rate")]
+    cadence_s: Number
+    inertia_sigma_before_per_spin_inertia: NotRequired[dict[str, Number]]
+    momentum_sigma_per_spin_inertia_rad_s: NotRequired[Vector]
 
 
 @dataclass(frozen=True)
-class SlewOption:
-    """One turn, and what it would leave: ``sigma`` (6,), one sigma in the order of ELEMENTS.
+class PlannedTurn:
+    """One turn, and what it would leave: ``inertia_sigma_kgm2`` (6,), one sigma in the order of ELEMENTS.
 
-    ``gain``: half the fall of the covariance's log determinant, nats.  ``rate`` and ``acceleration`` are those wanted,
-    or less: where the wheels cannot give them (``limited``), or the angle is too small to reach the rate."""
+    ``gain``: half the fall of the covariance's log determinant, nats.  ``rate_rad_s`` and ``acceleration_rad_s2`` are those
+    asked for, or less: where the wheels cannot give them (``limited``), or the angle is too small to reach the rate."""
 
     axis: np.ndarray
-    angle: float
-    rate: float
-    acceleration: float
+    angle_rad: float
+    rate_rad_s: float
+    acceleration_rad_s2: float
     duration_s: float
-    sigma: np.ndarray
+    inertia_sigma_kgm2: np.ndarray
     gain: float
     rank: int
     limited: bool
 
-    def record(self) -> dict:
-        return {
+    def record(self, *, relative: bool) -> dict:
+        sigma = dict(zip(ELEMENTS, self.inertia_sigma_kgm2, strict=True))
+        record = {
             "axis": self.axis,
-            "angle_rad": self.angle,
-            "rate_rad_s": self.rate,
-            "acceleration_rad_s2": self.acceleration,
+            "angle_rad": self.angle_rad,
+            "rate_rad_s": self.rate_rad_s,
+            "acceleration_rad_s2": self.acceleration_rad_s2,
             "duration_s": self.duration_s,
             "limited_by_wheels": self.limited,
             "gain_nats": self.gain,
             "rank": self.rank,
-            "sigma": dict(zip(ELEMENTS, self.sigma, strict=True)),
+            "inertia_sigma_kgm2": sigma,
         }
+        if relative:
+            per_spin_inertia(record, ["inertia_sigma_kgm2"])
+        return record | {"sigma": sigma}
 
 
-@dataclass(frozen=True)
-class SlewPlan:
-    """The best turn, and the body axes beside it.  Sigmas in kg m2, or per unit spin inertia where ``relative``."""
+@dataclass(frozen=True, kw_only=True, repr=False)
+class SlewPlanResult(Estimate):
+    """The best turn, and those about the body axes beside it.  Sigmas in kg m2, or per unit spin inertia where ``relative``."""
 
-    craft: str
-    inertia: np.ndarray  # (3, 3), what the prior is centred on
+    RECORD: ClassVar[type] = SlewPlanRecord
+
+    inertia_kgm2: np.ndarray  # (3, 3), what the prior is centred on
     rank_before: int
-    sigma_before: np.ndarray
-    options: tuple[SlewOption, ...]  # the best first
-    momentum_sigma: np.ndarray  # (3,), noise of a sample [N m s]
+    inertia_sigma_before_kgm2: np.ndarray  # (6,)
+    turns: tuple[PlannedTurn, ...]  # the best first
+    momentum_sigma_Nms: np.ndarray  # (3,), noise of a sample
+    rate_sigma_rad_s: float
     cadence_s: float
     relative: bool
-    doubts: tuple[str, ...]
 
     @property
-    def best(self) -> SlewOption:
-        return self.options[0]
+    def best(self) -> PlannedTurn:
+        return self.turns[0]
 
-    def record(self) -> dict:
-        """The JSON form, without command and provenance."""
-        return {
+    def _record(self) -> dict:
+        before = dict(zip(ELEMENTS, self.inertia_sigma_before_kgm2, strict=True))
+        best, *others = (t.record(relative=self.relative) for t in self.turns)
+        record = {
             "craft": self.craft,
-            "criterion": "D-optimal",
+            "criterion": self.method,
             "unit": "per spin inertia" if self.relative else "kg m2",
             "rank_before": self.rank_before,
-            "sigma_before": dict(zip(ELEMENTS, self.sigma_before, strict=True)),
-            "best": self.best.record(),
-            "others": [o.record() for o in self.options[1:]],
-            "momentum_sigma_Nms": None if self.relative else self.momentum_sigma,
+            "inertia_sigma_before_kgm2": before,
+            "best": best,
+            "others": others,
+            "momentum_sigma_Nms": self.momentum_sigma_Nms,
+            "rate_sigma_rad_s": self.rate_sigma_rad_s,
             "cadence_s": self.cadence_s,
-            "doubts": list(self.doubts),
         }
+        if self.relative:
+            per_spin_inertia(record, ["inertia_sigma_before_kgm2", "momentum_sigma_Nms"])
+        return record | {"sigma_before": before}
 
-    def __str__(self) -> str:
-        """The table a person scans."""
+    def _tables(self) -> tuple[Table, ...]:
         unit = "per unit spin inertia" if self.relative else "kg m2"
         b = self.best
-        lines = [
-            f"Next slew for the inertia tensor · {self.craft} · rank so far {self.rank_before}",
-            f"  best: {np.degrees(b.angle):.3g} deg about {named(b.axis)} at {1e3 * b.rate:.3g} mrad/s, {b.duration_s:.0f} s: "
-            f"rank {b.rank}",
-            f"  one sigma [{unit}]" + " " * (19 - len(unit)) + "gain" + "".join(f"{c:>9}" for c in ELEMENTS),
-            _row("now", None, self.sigma_before),
-        ]
-        for o in self.options:
-            slow = f", {1e3 * o.rate:.2g} mrad/s" if o.limited else ""
-            lines.append(_row(f"about {named(o.axis)}{slow}", o.gain, o.sigma))
-        return "\n".join(lines)
+        title = (
+            f"Next slew for the inertia tensor · {self.craft} · rank so far {self.rank_before}\n"
+            f"  best: {np.degrees(b.angle_rad):.3g} deg about {named(b.axis)} at {_rate(b.rate_rad_s)}, {b.duration_s:.0f} s: "
+            f"rank {b.rank}"
+        )
+        rows = [("now", "", *_digits(self.inertia_sigma_before_kgm2))]
+        for t in self.turns:
+            slow = f", {_rate(t.rate_rad_s)}" if t.limited else ""
+            rows.append((f"about {named(t.axis)}{slow}", f"{t.gain:.1f}", *_digits(t.inertia_sigma_kgm2)))
+        return (Table(title, tuple(rows), (f"one sigma [{unit}]", "gain", *ELEMENTS)),)
 
 
-def _row(what: str, gain, sigma) -> str:
-    return f"    {what:<30}{'' if gain is None else f'{gain:.1f}':>6}" + "".join(f"{s:>9.3g}" for s in sigma)
+def _rate(rate_rad_s: float) -> str:
+    factor, unit = scaled_unit(rate_rad_s, "rad/s")
+    return f"{factor * rate_rad_s:.3g} {unit}"
 
 
-def plan_slew(
-    now: CraftAt,
+def _digits(sigma) -> tuple[str, ...]:
+    return tuple(f"{s:.3g}" for s in sigma)
+
+
+@recorded
+def slew_plan(
+    craft: Craft,
+    telemetry: Telemetry | None = None,
     *,
-    flown_B=None,
-    angle: float = np.radians(25.0),
-    rate: float = 2e-3,
-    acceleration: float = 2e-5,
-    wheel_rates=None,
-    rate_sigma: float = RATE_SIGMA,
-    wheel_sigma: float = WHEEL_SIGMA,
-    cadence_s: float = 4.0,
-) -> SlewPlan:
-    """The best turn by ``angle`` [rad], at most at ``rate`` [rad/s] and ``acceleration`` [rad/s^2].
+    angle_rad: float = np.radians(25.0),
+    rate_rad_s: float = 2e-3,
+    acceleration_rad_s2: float = 2e-5,
+    date: str | None = None,
+    wheel_rates_rad_s=None,
+    wheel_sigma_rad_s: float = WHEEL_SIGMA,
+) -> SlewPlanResult:
+    """The rest-to-rest turn that would tell most of the inertia tensor, within the wheels' limits.
 
-    ``flown_B``: body rates (N, 3) of what has been flown [rad/s], every ``cadence_s``; None: nothing.  ``wheel_rates``
-    at its start [rad/s], one a wheel in service (None: all at rest).  ``rate_sigma``, ``wheel_sigma``: noise of a sample [rad/s].
-    Raises BadInput for an inertia not known, a turn that is none, and where the wheels can give no such turn."""
+    Parameters
+    ----------
+    craft : Craft
+        Inertia, wheels and their limits.
+    telemetry : Telemetry, optional
+        What has been flown: body and wheel rates.  Unless given, nothing: samples every 4 s, nominal noise.
+    angle_rad, rate_rad_s, acceleration_rad_s2 : float
+        Angle of the turn, and its largest rate and acceleration.
+    date : str, optional
+        UTC date of the craft where no telemetry is given; the latest unless given.
+    wheel_rates_rad_s : array_like of shape (n,), optional
+        Rates of the wheels in service at the start of the turn; those at the end of the telemetry unless given, else at rest.
+    wheel_sigma_rad_s : float
+        Noise of a sample of a wheel's rate.
+
+    Returns
+    -------
+    SlewPlanResult
+        The turn with the smallest determinant of the posterior covariance (D-optimal), and those about the body axes.
+
+    Raises
+    ------
+    BadInput
+        Where the inertia is not known, for a turn that is none, and where the wheels can give no such turn.
+    """
+    turn = _Turn.asked(angle_rad, rate_rad_s, acceleration_rad_s2)
+    now, flown, doubts = _begun(craft, telemetry, date)
     I_B = now.inertia_kgm2
     if I_B is None:
         raise BadInput(
             f"the inertia of {now.craft.name} is not known, and the plan starts from it",
             remedy='Give it: --inertia "Ixx,Iyy,Izz,Ixy,Ixz,Iyz" in kg m2.',
         )
-    for value, what in ((angle, "angle"), (rate, "rate"), (acceleration, "acceleration"), (cadence_s, "cadence")):
-        if not 0 < value < 1e6:
-            raise BadInput(f"a turn of {what} {value:g} is none", remedy=f"Give a positive {what}.")
-    noise = momentum_noise(I_B, now.wheels, rate_sigma, wheel_sigma)
-    prior = np.diag(1 / prior_sigma(I_B) ** 2)
-    flown = np.zeros((1, 3)) if flown_B is None else np.asarray(flown_B, float).reshape(-1, 3)
-    flown = flown[np.isfinite(flown).all(axis=1)]
-    known = prior + _information((flown - flown.mean(axis=0)).T @ (flown - flown.mean(axis=0)), noise)
-    wheels = _Wheels(now, wheel_rates)
-    options = []
-    for axis, speed in zip(*_possible(wheels, I_B, angle, rate, acceleration), strict=True):
-        course = _rates(angle, speed * rate, speed**2 * acceleration, cadence_s)
-        after = known + _information(np.outer(axis, axis) * np.sum((course - course.mean()) ** 2), noise)
-        options.append((_log_det(after) - _log_det(known), axis, speed, course, after))
-    if not options:
+    noise = momentum_noise(I_B, now.wheels, flown.rate_sigma, wheel_sigma_rad_s)
+    known = np.diag(1 / prior_sigma(I_B) ** 2) + _information(flown.square, noise)
+    wheels = _Wheels(now, flown.wheel_rates if wheel_rates_rad_s is None else wheel_rates_rad_s)
+    tried = [
+        _tried(axis, speed, turn, flown.cadence_s, known, noise)
+        for axis, speed in zip(*_possible(wheels, I_B, turn), strict=True)
+    ]
+    if not tried:
         raise BadInput(
-            f"no turn by {np.degrees(angle):.3g} deg fits the wheels' limits, however slow",
+            f"no turn by {np.degrees(angle_rad):.3g} deg fits the wheels' limits, however slow",
             remedy="Plan a smaller --angle, or a record at whose end the wheels turn slower.",
         )
-    best = max(options, key=lambda o: o[0])
-    missing = [a for j, a in enumerate("xyz") if not any(abs(o[1][j]) == 1.0 for o in options)]
-    if missing:
-        wheels.doubts.append(f"no turn about {', '.join(missing)} fits the wheels' limits, however slow")
-    chosen = [best] + [o for o in options if np.abs(o[1]).max() == 1.0 and o is not best]
-    rows = tuple(
-        SlewOption(
-            axis, angle, _top(angle, speed * rate, speed**2 * acceleration), speed**2 * acceleration,
-            _duration(angle, speed * rate, speed**2 * acceleration),
-            np.sqrt(np.diag(np.linalg.inv(after))), gain / 2,
-            excitation(np.vstack([flown, np.outer(course, axis)]), rate_sigma).rank, bool(speed < 1),
-        )
-        for gain, axis, speed, course, after in chosen
-    )  # fmt: skip
-    return SlewPlan(
-        now.craft.name, I_B, excitation(flown, rate_sigma).rank, np.sqrt(np.diag(np.linalg.inv(known))), rows, noise, cadence_s,
-        now.relative, tuple(dict.fromkeys([*now.doubts, *wheels.doubts, *_doubts(now)])),
-    )  # fmt: skip
+    best = max(tried, key=lambda t: t.gain)
+    chosen = [best] + [t for t in tried if np.abs(t.axis).max() == 1.0 and t is not best]
+    return SlewPlanResult(
+        craft=now.craft.name,
+        epoch="" if telemetry is None else telemetry.epoch_label,
+        method="D-optimal",
+        inertia_kgm2=I_B,
+        rank_before=excitation(flown.omega_B, flown.rate_sigma).rank,
+        inertia_sigma_before_kgm2=np.sqrt(np.diag(np.linalg.inv(known))),
+        turns=tuple(t.planned(flown) for t in chosen),
+        momentum_sigma_Nms=noise,
+        rate_sigma_rad_s=flown.rate_sigma,
+        cadence_s=flown.cadence_s,
+        relative=now.relative,
+        doubts=Doubts([*doubts, *wheels.doubts, *_plan_doubts(now, tried)]),
+    )
 
 
-def what_was_flown(telemetry: Telemetry, craft: Craft) -> tuple[CraftAt, dict]:
-    """The craft on the record's date, and what ``plan_slew`` takes of the record: rates and their noise, wheel rates at its end.
+def _plan_doubts(now: CraftAt, tried: list[_Tried]) -> list[Doubt]:
+    missing = [a for j, a in enumerate(AXES) if not any(abs(t.axis[j]) == 1.0 for t in tried)]
+    doubts = [NO_TURN_ABOUT(axes=missing)] if missing else []
+    doubts.append(NOISE_ONLY())
+    if now.relative:
+        doubts.append(RATIOS_ONLY(product_percent=100 * PRODUCT_SHARE))
+    return doubts
 
-    Raises BadInput where body or wheel rates are missing."""
+
+# ---- what has been flown ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Flown:
+    """Body rates (N, 3) of what has been flown, wheel rates at its end (None: at rest), cadence, and noise of a rate sample."""
+
+    omega_B: np.ndarray = field(default_factory=lambda: np.zeros((1, 3)))
+    wheel_rates: list[float] | None = None
+    cadence_s: float = _CADENCE_S
+    rate_sigma: float = RATE_SIGMA
+
+    @property
+    def square(self) -> np.ndarray:
+        """Sum of w w^T about the mean, (3, 3)."""
+        mean = self.omega_B.mean(axis=0)
+        return (self.omega_B - mean).T @ (self.omega_B - mean)
+
+
+def _begun(craft: Craft, telemetry: Telemetry | None, date: str | None) -> tuple[CraftAt, _Flown, Doubts]:
+    """The craft on the telemetry's date, or on the one given; what has been flown, and doubts of both."""
+    if telemetry is None:
+        now = craft.at(None if date is None else int(utc_to_tai_ns(date)))
+        return now, _Flown(), now.doubts
     subject = subject_of(telemetry, craft)
+    return subject.craft, _flown_in(subject), subject.doubts
+
+
+def _flown_in(subject: Subject) -> _Flown:
+    """Raises BadInput where body or wheel rates are missing."""
+    telemetry = subject.telemetry
     rates = [telemetry.channel(f"body_rate_{a}").usable for a in AXES]
-    tai_ns, flown = together(telemetry, [c.name for c in rates])
+    tai_ns, omega = together(telemetry, [c.name for c in rates])
     wheels = [c.usable for c, _ in subject.wheels()]
     if min(len(tai_ns), *(len(c.values) for c in [*rates, *wheels])) < 2:
         raise BadInput(
@@ -203,11 +323,8 @@ def what_was_flown(telemetry: Telemetry, craft: Craft) -> tuple[CraftAt, dict]:
         )
     sigma = max(_noise_of(c) for c in rates)
     at_end = [float(np.median(c.values[-5:])) for c in wheels]
-    found = {
-        "flown_B": flown, "wheel_rates": at_end, "cadence_s": cadence_ns(tai_ns) / NS,
-        "rate_sigma": sigma if sigma > 0 else RATE_SIGMA,
-    }  # fmt: skip
-    return replace(subject.craft, doubts=subject.doubts), found
+    omega = omega[np.isfinite(omega).all(axis=1)]
+    return _Flown(omega, at_end, cadence_ns(tai_ns) / NS, sigma if sigma > 0 else RATE_SIGMA)
 
 
 def _noise_of(channel: Channel) -> float:
@@ -231,42 +348,76 @@ def _information(square, noise) -> np.ndarray:
     return normal_matrix(square, 1 / noise**2)
 
 
+# ---- the turn --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Turn:
+    """A turn that speeds up, coasts and slows down."""
+
+    angle: float
+    rate: float
+    acceleration: float
+
+    @classmethod
+    def asked(cls, angle: float, rate: float, acceleration: float) -> _Turn:
+        """Raises BadInput for a turn that is none."""
+        for value, what in ((angle, "angle"), (rate, "rate"), (acceleration, "acceleration")):
+            if not 0 < value < 1e6:
+                raise BadInput(
+                    f"the {what} of a turn must be positive, not {value:g}", remedy=f"Give a positive {what}."
+                )
+        return cls(angle, rate, acceleration)
+
+    @property
+    def top(self) -> float:
+        """The largest rate, which is less than wanted where the angle is too small to reach it."""
+        return float(min(self.rate, np.sqrt(self.angle * self.acceleration)))
+
+    @property
+    def duration(self) -> float:
+        return self.angle / self.top + self.top / self.acceleration
+
+    def rate_at(self, t) -> np.ndarray:
+        return np.clip(self.acceleration * np.minimum(t, self.duration - t), 0.0, self.top)
+
+    def sampled(self, cadence_s: float) -> np.ndarray:
+        """Rate at every sample of the turn and of the holds around it, (N,)."""
+        return self.rate_at(np.arange(-_HOLD_S, self.duration + _HOLD_S, cadence_s))
+
+    def slower(self, share: float) -> _Turn:
+        """The same turn at a share of its rate, slower in time alone."""
+        return _Turn(self.angle, share * self.rate, share**2 * self.acceleration)
+
+
+class _Tried(NamedTuple):
+    """A turn about an axis: the rise of the information's log determinant, its rates, and the information after it."""
+
+    gain: float
+    axis: np.ndarray
+    share: float
+    turn: _Turn
+    course: np.ndarray
+    after: np.ndarray
+
+    def planned(self, flown: _Flown) -> PlannedTurn:
+        rank = excitation(np.vstack([flown.omega_B, np.outer(self.course, self.axis)]), flown.rate_sigma).rank
+        sigma = np.sqrt(np.diag(np.linalg.inv(self.after)))
+        turn = self.turn
+        return PlannedTurn(
+            self.axis, turn.angle, turn.top, turn.acceleration, turn.duration, sigma, self.gain / 2, rank, bool(self.share < 1)
+        )  # fmt: skip
+
+
+def _tried(axis, share: float, asked: _Turn, cadence_s: float, known: np.ndarray, noise: np.ndarray) -> _Tried:
+    turn = asked.slower(share)
+    course = turn.sampled(cadence_s)
+    after = known + _information(np.outer(axis, axis) * np.sum((course - course.mean()) ** 2), noise)
+    return _Tried(_log_det(after) - _log_det(known), axis, share, turn, course, after)
+
+
 def _log_det(matrix) -> float:
     return float(np.linalg.slogdet(matrix)[1])
-
-
-def _doubts(now: CraftAt) -> list[str]:
-    doubts = [
-        "the sigmas are those of noise alone: errors of the spin inertia and of the gyros' scale add their share, 0.2 to 1 %"
-    ]
-    if now.relative:
-        doubts.append("only ratios to the spin inertia are known: products start from 1 % of the mean moment")
-    return doubts
-
-
-# ---- the turn ----------------------------------------------------------------------------------------------
-
-
-def _top(angle: float, rate: float, acceleration: float) -> float:
-    """The largest rate of a turn, which is less than wanted where the angle is too small to reach it."""
-    return float(min(rate, np.sqrt(angle * acceleration)))
-
-
-def _duration(angle: float, rate: float, acceleration: float) -> float:
-    """Of a turn that speeds up, coasts and slows down."""
-    top = _top(angle, rate, acceleration)
-    return angle / top + top / acceleration
-
-
-def _rates(angle: float, rate: float, acceleration: float, cadence_s: float) -> np.ndarray:
-    """Rate at every sample of a turn and of the holds around it, (N,)."""
-    whole = _duration(angle, rate, acceleration)
-    t = np.arange(-_HOLD_S, whole + _HOLD_S, cadence_s)
-    return _trapezoid(t, whole, angle, rate, acceleration)
-
-
-def _trapezoid(t, whole: float, angle: float, rate: float, acceleration: float) -> np.ndarray:
-    return np.clip(acceleration * np.minimum(t, whole - t), 0.0, _top(angle, rate, acceleration))
 
 
 def _directions() -> np.ndarray:
@@ -278,7 +429,7 @@ def _directions() -> np.ndarray:
     return np.vstack([np.eye(3), -np.eye(3), spiral])
 
 
-def _possible(wheels: _Wheels, I_B, angle, rate, acceleration) -> tuple[np.ndarray, np.ndarray]:
+def _possible(wheels: _Wheels, I_B, turn: _Turn) -> tuple[np.ndarray, np.ndarray]:
     """Directions (C, 3) that the wheels can turn the body about, and the share of the rate they can give, (C,).
 
     Of the two ways round a body axis the faster one is kept, the positive one where both are alike."""
@@ -287,7 +438,7 @@ def _possible(wheels: _Wheels, I_B, angle, rate, acceleration) -> tuple[np.ndarr
     for share in _SLOWER:
         left = np.flatnonzero(speed == 0)
         if len(left):
-            speed[left[wheels.can(axes[left], I_B, angle, share * rate, share**2 * acceleration)]] = share
+            speed[left[wheels.can(axes[left], I_B, turn.slower(share))]] = share
     speed[:3] = np.where(speed[3:6] > speed[:3], 0.0, speed[:3])
     speed[3:6] = np.where(speed[:3] > 0, 0.0, speed[3:6])
     return axes[speed > 0], speed[speed > 0]
@@ -302,24 +453,23 @@ class _Wheels:
         self.start = np.zeros(len(self.spin)) if rates is None else np.asarray(rates, float)
         self.rate_limit = np.array([np.inf if w.rate_limit is None else w.rate_limit for w in now.wheels])
         self.torque_limit = np.array([np.inf if w.torque_limit is None else w.torque_limit for w in now.wheels])
-        self.doubts = [
-            f"the {what} of the wheels is not in the craft file, and the turn may be more than they can give"
-            for what, limit in (("rate limit", self.rate_limit), ("torque limit", self.torque_limit))
-            if not len(limit) or np.isinf(limit).any()
-        ]
         if len(self.start) != len(self.spin):
             raise BadInput(
                 f"{len(self.start)} wheel rates for {len(self.spin)} wheels",
                 remedy=f"Give one for each of {', '.join(w.name for w in now.wheels)}.",
             )
 
-    def can(self, axes, I_B, angle: float, rate: float, acceleration: float) -> np.ndarray:
+    @property
+    def doubts(self) -> list[Doubt]:
+        limits = (("rate limit", self.rate_limit), ("torque limit", self.torque_limit))
+        return [LIMIT_UNKNOWN(limit=what) for what, limit in limits if not len(limit) or np.isinf(limit).any()]
+
+    def can(self, axes, I_B, turn: _Turn) -> np.ndarray:
         """Which of the directions (C, 3) can be turned about within all limits, (C,) bool."""
         if not len(self.spin):
             return np.ones(len(axes), bool)
-        whole = _duration(angle, rate, acceleration)
-        t = np.linspace(0.0, whole, 81)
-        r = _trapezoid(t, whole, angle, rate, acceleration)
+        t = np.linspace(0.0, turn.duration, 81)
+        r = turn.rate_at(t)
         turned = np.concatenate([[0.0], np.cumsum(0.5 * (r[1:] + r[:-1]) * np.diff(t))])
         h0 = (self.spin * self.start) @ self.axes
         back = Rotation.from_rotvec((-turned[None, :, None] * axes[:, None, :]).reshape(-1, 3))

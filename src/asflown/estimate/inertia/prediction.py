@@ -1,4 +1,4 @@
-"""An estimated inertia tensor beside a predicted one, in the form of 001's Table 1 (eqs 12, 13)."""
+"""An estimated inertia tensor beside a predicted one, in the form of Feldman and Lee's Table 1 (eqs 12, 13)."""
 
 from __future__ import annotations
 
@@ -6,8 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...craft.model import Craft, InertiaRequirement, MassProperties, tensor
+from ...craft.model import STALE_NS, Craft, InertiaRequirement, MassProperties, tensor
+from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput
+from ...kit.result import per_spin_inertia
+from ...kit.schema import Annotated, Doc, DoubtRecord, Matrix, NotRequired, Number, TypedDict
+from ...kit.table import Table
 from ...kit.timeline import utc_label
 from ...telemetry.attitude import MISTAKEN_UNITS
 
@@ -15,27 +19,87 @@ from ...telemetry.attitude import MISTAKEN_UNITS
 ROWS = {"Ixx": (0, 0), "Iyy": (1, 1), "Izz": (2, 2), "Ixy": (0, 1), "Ixz": (0, 2), "Iyz": (1, 2)}
 
 MET, NOT_MET, OPEN = "met", "not met", "open"
-#: A prediction further from the date than this is doubted. [ns]
-_LONG_AGO_NS = 200 * 86_400 * 10**9
 #: Moments whose ratio is this near to a unit's factor, and alike within this, are taken for a wrong unit.
 _NEAR_FACTOR, _ALIKE = 1.25, 1.5
+
+NO_PREDICTION = Kind(
+    "inertia.no-prediction", Severity.NOTE,
+    "the craft file holds no prediction for this configuration: the estimate is compared with the craft's own tensor",
+    "Add [[mass_properties]] with basis = \"predicted\" to the craft file.",
+)  # fmt: skip
+OLD_PREDICTION = Kind(
+    "inertia.old-prediction", Severity.CAUTION,
+    "the prediction is of {predicted}, the nearest in the craft file to {date}",
+    "Add a prediction of that date to the craft file.",
+)  # fmt: skip
+IMPOSSIBLE = Kind(
+    "inertia.impossible", Severity.SUSPECT, "no rigid body has the estimated inertia: its {quantity} is {value:.4g}",
+    "Check wheel axes, spin inertia and units.",
+)  # fmt: skip
+WRONG_UNIT = Kind(
+    "inertia.wrong-unit", Severity.SUSPECT,
+    "all moments are {ratio:.3g} times the predicted ones: are the {guesses}?", "Check the units of these channels.",
+)  # fmt: skip
+
+
+class PredictedRecord(TypedDict):
+    inertia_kgm2: Matrix | None
+    basis: str
+    date: str
+    source: str
+    inertia_per_spin_inertia: NotRequired[Matrix]
+
+
+class ComponentRecord(TypedDict):
+    """One element; percent for moments, kg m2 for products; values per unit spin inertia where kg m2 is null for both."""
+
+    name: str
+    predicted_kgm2: Number
+    estimated_kgm2: Number
+    estimated_sigma_kgm2: Number
+    error_percent: Annotated[Number, Doc("predicted less estimated, of the predicted; moments")]
+    error_sigma_percent: Number
+    error_kgm2: Annotated[Number, Doc("predicted less estimated; products")]
+    error_sigma_kgm2: Number
+    requirement_percent: Number
+    requirement_kgm2: Number
+    verdict: Annotated[str | None, Doc("met, not met, or open: 95 % of the estimate lies on both sides")]
+    predicted_per_spin_inertia: NotRequired[Number]
+    estimated_per_spin_inertia: NotRequired[Number]
+    estimated_sigma_per_spin_inertia: NotRequired[Number]
+    error_per_spin_inertia: NotRequired[Number]
+    error_sigma_per_spin_inertia: NotRequired[Number]
+
+
+class ComparisonRecord(TypedDict):
+    unit: Annotated[str, Doc("kg m2, or per spin inertia")]
+    predicted: PredictedRecord
+    components: list[ComponentRecord]
+    smallest_moment_kgm2: Annotated[Number, Doc("smallest principal moment; positive for a rigid body")]
+    triangle_margin_kgm2: Annotated[
+        Number, Doc("half of what two principal moments exceed the third by; positive for a rigid body")
+    ]
+    doubts: list[str]
+    doubts_detail: list[DoubtRecord]
+    smallest_moment_per_spin_inertia: NotRequired[Number]
+    triangle_margin_per_spin_inertia: NotRequired[Number]
 
 
 @dataclass(frozen=True)
 class Prediction:
     """A tensor (3, 3) to compare with, and where it is from."""
 
-    inertia: np.ndarray
+    inertia_kgm2: np.ndarray
     basis: str
     date: str
     source: str
     requirement: InertiaRequirement | None = None
-    doubts: tuple[str, ...] = ()
+    doubts: Doubts = Doubts()
 
 
 @dataclass(frozen=True)
 class Compared:
-    """One component.  ``error``: predicted less estimated, in percent of the predicted for moments (001 eq 12), else as
+    """One component.  ``error``: predicted less estimated, in percent of the predicted for moments (eq 12), else as
     it is (eq 13).  ``verdict``: whether the requirement is met; 'open' where 95 % of the estimate lies on both sides."""
 
     name: str
@@ -51,20 +115,51 @@ class Compared:
     def moment(self) -> bool:
         return self.name[1] == self.name[2]
 
+    def record(self, *, relative: bool) -> dict:
+        """The JSON form, with the keys of earlier versions."""
+        error, sigma, asked = self.error, self.sigma_error, self.requirement
+        of_moment = (error, sigma, asked) if self.moment else (None, None, None)
+        of_product = (None, None, None) if self.moment else (error, sigma, asked)
+        record = {
+            "name": self.name,
+            "predicted_kgm2": self.predicted,
+            "estimated_kgm2": self.estimated,
+            "estimated_sigma_kgm2": self.sigma,
+            **dict(zip(("error_percent", "error_sigma_percent", "requirement_percent"), of_moment, strict=True)),
+            **dict(zip(("error_kgm2", "error_sigma_kgm2", "requirement_kgm2"), of_product, strict=True)),
+            "verdict": self.verdict,
+        }
+        if relative:
+            names = ["predicted_kgm2", "estimated_kgm2", "estimated_sigma_kgm2"]
+            per_spin_inertia(record, names if self.moment else [*names, "error_kgm2", "error_sigma_kgm2"])
+        return record | {
+            "predicted": self.predicted, "estimated": self.estimated, "sigma": self.sigma, "error": of_product[0],
+            "sigma_error": sigma, "requirement": asked,
+        }  # fmt: skip
+
+    def row(self) -> tuple[str, ...]:
+        """As in Table 1."""
+        unit = " %" if self.moment else ""
+        error = f"{self.error:+.2f}{unit}" if self.moment else _short(self.error, "+")
+        asked = () if self.requirement is None else (f"{self.requirement:g}{unit} {self.verdict}",)
+        sigma = "" if self.sigma is None else f"{self.sigma:.3g}"
+        return self.name, _short(self.predicted), _short(self.estimated), sigma, error, *asked
+
 
 @dataclass(frozen=True)
 class InertiaComparison:
     """All six, and how far the estimate is from what no rigid body can be.
 
-    ``smallest_moment``: the smallest principal moment; ``triangle_margin``: the smallest eigenvalue of
-    trace(I)/2 - I, half of what two principal moments exceed the third by.  Both must be positive."""
+    ``smallest_moment_kgm2``: the smallest principal moment; ``triangle_margin_kgm2``: the smallest eigenvalue of
+    trace(I)/2 - I, half of what two principal moments exceed the third by.  Both must be positive.  All per unit spin
+    inertia where ``relative``."""
 
     prediction: Prediction
     rows: tuple[Compared, ...]
-    smallest_moment: float
-    triangle_margin: float
+    smallest_moment_kgm2: float
+    triangle_margin_kgm2: float
     relative: bool
-    doubts: tuple[str, ...]
+    doubts: Doubts
 
     def row(self, name: str) -> Compared:
         return next(r for r in self.rows if r.name == name)
@@ -74,45 +169,33 @@ class InertiaComparison:
         return "per spin inertia" if self.relative else "kg m2"
 
     def record(self) -> dict:
-        """The JSON form.  Errors of moments in percent, of products in ``unit``."""
+        """The JSON form, with the keys of earlier versions."""
+        p = self.prediction
+        predicted = {"inertia_kgm2": p.inertia_kgm2, "basis": p.basis, "date": p.date, "source": p.source}
+        sizes = {"smallest_moment_kgm2": self.smallest_moment_kgm2, "triangle_margin_kgm2": self.triangle_margin_kgm2}
+        if self.relative:
+            per_spin_inertia(predicted, ["inertia_kgm2"])
+            per_spin_inertia(sizes, list(sizes))
         return {
             "unit": self.unit,
-            "predicted": {
-                "inertia": self.prediction.inertia, "basis": self.prediction.basis, "date": self.prediction.date,
-                "source": self.prediction.source,
-            },
-            "components": [
-                {
-                    "name": r.name, "predicted": r.predicted, "estimated": r.estimated, "sigma": r.sigma,
-                    "error_percent": r.error if r.moment else None, "error": None if r.moment else r.error,
-                    "sigma_error": r.sigma_error, "requirement": r.requirement, "verdict": r.verdict,
-                }
-                for r in self.rows
-            ],
-            "smallest_moment": self.smallest_moment,
-            "triangle_margin": self.triangle_margin,
-            "doubts": list(self.doubts),
-        }  # fmt: skip
+            "predicted": predicted | {"inertia": p.inertia_kgm2},
+            "components": [r.record(relative=self.relative) for r in self.rows],
+            **sizes,
+            "smallest_moment": self.smallest_moment_kgm2,
+            "triangle_margin": self.triangle_margin_kgm2,
+            **self.doubts.record(),
+        }
 
-    def __str__(self) -> str:
+    def table(self, title: str = "") -> Table:
         """Table 1, one window of it."""
         p = self.prediction
-        lines = [
-            f"Estimate against {p.basis} inertia of {p.date} ({p.source}) [{self.unit}]",
-            f"  {'':4}{'predicted':>11}{'estimated':>11}{'sigma':>9}{'error':>11}   requirement",
-        ]
-        for r in self.rows:
-            unit = " %" if r.moment else "  "
-            error = f"{r.error:+.2f}" if r.moment else _short(r.error, "+")
-            sigma = "" if r.sigma is None else f"{r.sigma:.3g}"
-            asked = "" if r.requirement is None else f"{r.requirement:g}{unit.rstrip()} {r.verdict}"
-            lines.append(
-                f"  {r.name:4}{_short(r.predicted):>11}{_short(r.estimated):>11}{sigma:>9}{error:>9}{unit}   {asked}".rstrip()
-            )
-        lines.append(
-            f"  smallest principal moment {_short(self.smallest_moment)}, triangle margin {_short(self.triangle_margin)}"
-        )
-        return "\n".join(lines)
+        what = f"{title}Estimate against {p.basis} inertia of {p.date} ({p.source}) [{self.unit}]"
+        sizes = f"smallest principal moment {_short(self.smallest_moment_kgm2)}, triangle margin {_short(self.triangle_margin_kgm2)}"
+        head = ("", "predicted", "estimated", "sigma", "error", "requirement")
+        return Table(what, tuple(r.row() for r in self.rows), head, (sizes,))
+
+    def __str__(self) -> str:
+        return str(self.table())
 
 
 def _short(value: float, sign: str = "") -> str:
@@ -129,43 +212,40 @@ def predicted_inertia(craft: Craft, tai_ns: int | None) -> Prediction:
     moment = tai_ns if tai_ns is not None else max((m.date for m in craft.mass_properties), default=0)
     piece = next((m.piece for m in reversed(known) if m.date <= moment), known[0].piece if known else None)
     candidates = [m for m in craft.mass_properties if m.basis == "predicted" and piece in (None, m.piece)]
+    asked = craft.inertia_requirement
     if candidates:
         m = min(candidates, key=lambda m: abs(m.date - moment))
-        return Prediction(
-            tensor(m.elements),
-            "predicted",
-            utc_label(m.date)[:10],
-            m.source,
-            craft.inertia_requirement,
-            _age(m, moment),
-        )
+        return Prediction(tensor(m.elements), "predicted", _day(m.date), m.source, asked, _age(m, moment))
     now = craft.at(tai_ns)
     if now.inertia_kgm2 is None:
         raise BadInput(
             f"{craft.name} has no inertia to compare an estimate with",
             remedy="Add [[mass_properties]] to the craft file, or give --inertia.",
         )
-    source = (
-        "given by the user" if piece == "given" else "the craft's tensor on that date, which may itself be an estimate"
-    )
-    date = utc_label(moment)[:10] if piece != "given" else "any date"
-    doubts = () if piece == "given" else ("no prediction is in the craft file for this configuration",)
-    return Prediction(now.inertia_kgm2, "craft's", date, source, craft.inertia_requirement, (*doubts, *now.doubts))
+    if piece == "given":
+        return Prediction(now.inertia_kgm2, "craft's", "any date", "given by the user", asked, now.doubts)
+    source = "the craft's tensor on that date, which may itself be an estimate"
+    doubts = Doubts([NO_PREDICTION(), *now.doubts])
+    return Prediction(now.inertia_kgm2, "craft's", _day(moment), source, asked, doubts)
 
 
-def _age(m: MassProperties, moment: int) -> tuple[str, ...]:
-    if abs(m.date - moment) <= _LONG_AGO_NS:
-        return ()
-    return (f"the prediction is that of {utc_label(m.date)[:10]}, the nearest there is to {utc_label(moment)[:10]}",)
+def _day(tai_ns: int) -> str:
+    return utc_label(tai_ns)[:10]
 
 
-def compare_inertia(estimate, prediction: Prediction, sigma=None, relative: bool = False) -> InertiaComparison:
+def _age(m: MassProperties, moment: int) -> Doubts:
+    if abs(m.date - moment) <= STALE_NS:
+        return Doubts()
+    return Doubts([OLD_PREDICTION(predicted=_day(m.date), date=_day(moment))])
+
+
+def compare_inertia(estimate, prediction: Prediction, *, sigma=None, relative: bool = False) -> InertiaComparison:
     """Set an estimate (3, 3) against a prediction; ``sigma`` (3, 3): its total one sigma, where known.
 
     ``relative``: both are per unit spin inertia, of which no requirement on products speaks."""
     I_B, rows = np.asarray(estimate, float), []
     for name, at in ROWS.items():
-        predicted, estimated = float(prediction.inertia[at]), float(I_B[at])
+        predicted, estimated = float(prediction.inertia_kgm2[at]), float(I_B[at])
         s = None if sigma is None else float(np.asarray(sigma, float)[at])
         scale = 100 / predicted if at[0] == at[1] else 1.0
         asked = None
@@ -176,8 +256,10 @@ def compare_inertia(estimate, prediction: Prediction, sigma=None, relative: bool
         rows.append(Compared(name, predicted, estimated, s, error, s_error, asked, _verdict(error, s_error, asked)))
     moments = np.linalg.eigvalsh(I_B)
     margin = float(moments.sum() / 2 - moments[-1])
-    doubts = [*prediction.doubts, *_impossible(float(moments[0]), margin), *_wrong_unit(I_B, prediction.inertia)]
-    return InertiaComparison(prediction, tuple(rows), float(moments[0]), margin, relative, tuple(dict.fromkeys(doubts)))
+    found = [_impossible(float(moments[0]), margin), _wrong_unit(I_B, prediction.inertia_kgm2)]
+    return InertiaComparison(
+        prediction, tuple(rows), float(moments[0]), margin, relative, prediction.doubts + Doubts(found)
+    )
 
 
 def _verdict(error: float, sigma: float | None, asked: float | None) -> str | None:
@@ -188,20 +270,17 @@ def _verdict(error: float, sigma: float | None, asked: float | None) -> str | No
     return MET if abs(error) <= asked else NOT_MET
 
 
-def _impossible(smallest: float, margin: float) -> list[str]:
-    if smallest > 0 and margin >= 0:
-        return []
-    what = (
-        f"its smallest principal moment is {smallest:.4g}" if smallest <= 0 else f"its triangle margin is {margin:.4g}"
-    )
-    return [f"no rigid body has the estimated inertia: {what}"]
+def _impossible(smallest: float, margin: float) -> Doubt | None:
+    if smallest <= 0:
+        return IMPOSSIBLE(quantity="smallest principal moment", value=smallest)
+    return IMPOSSIBLE(quantity="triangle margin", value=margin) if margin < 0 else None
 
 
-def _wrong_unit(estimate, predicted) -> list[str]:
+def _wrong_unit(estimate, predicted) -> Doubt | None:
     """Moments are a wheel's rate over the body's: a factor in either shows in all three."""
     ratio = np.diag(estimate) / np.diag(predicted)
     if (ratio <= 0).any() or ratio.max() / ratio.min() > _ALIKE:
-        return []
+        return None
     mean = float(np.exp(np.mean(np.log(ratio))))
     guesses = [
         f"{which} rates {words}"
@@ -209,23 +288,4 @@ def _wrong_unit(estimate, predicted) -> list[str]:
         for factor, words in MISTAKEN_UNITS.items()
         if abs(np.log(scale / factor)) < np.log(_NEAR_FACTOR)
     ]
-    if not guesses:
-        return []
-    return [f"all moments are {mean:.3g} times the predicted ones: are the {', or the '.join(guesses)}?"]
-
-
-def compared_history(craft: Craft) -> list[tuple[str, str, InertiaComparison]]:
-    """(date, configuration, comparison) of every estimate in the craft file that has a prediction of its own date: 001's
-    Table 1 for Cassini."""
-    found = []
-    for m in sorted(craft.mass_properties, key=lambda m: m.date):
-        prediction = next(
-            (p for p in craft.mass_properties if p.basis == "predicted" and (p.date, p.piece) == (m.date, m.piece)),
-            None,
-        )
-        if m.basis != "estimated" or prediction is None:
-            continue
-        date = utc_label(m.date)[:10]
-        p = Prediction(tensor(prediction.elements), "predicted", date, prediction.source, craft.inertia_requirement)
-        found.append((date, m.piece, compare_inertia(tensor(m.elements), p, relative=m.inertia is None)))
-    return found
+    return WRONG_UNIT(ratio=mean, guesses=", or the ".join(guesses)) if guesses else None

@@ -1,6 +1,6 @@
 """Inertia tensor by conservation of momentum, sample by sample: axis by axis, all axes at once, and with its noise.
 
-001 section IV.  Where the body turns at w and its wheels hold h, momentum before the slew, carried into today's body
+Feldman and Lee, section IV.  Where the body turns at w and its wheels hold h, momentum before the slew, carried into today's body
 axes, less what the wheels hold now is the body's own:  Q = R^T R(0) h(0) - h = I w  (eqs 6, 9).
 """
 
@@ -73,7 +73,7 @@ def rows_of(record: SlewRecord) -> Rows:
 def by_axis(rows: Rows, slews: list[Slew]) -> Solved:
     """Eqs 6-8: from slews about one body axis at a time a column of the tensor each; products found twice are averaged.
 
-    Elements that no slew tells are NaN.  The random covariance counts the noise of the slew's first momentum, which
+    Elements that no slew identifies are NaN.  The random covariance counts the noise of the slew's first momentum, which
     all its rows share."""
     column, variance = np.full((3, 3), np.nan), np.full((3, 3), np.nan)
     residual, used = np.full((len(rows.time_s), 3), np.nan), np.zeros(len(rows.time_s), bool)
@@ -99,9 +99,10 @@ def by_axis(rows: Rows, slews: list[Slew]) -> Solved:
     both = np.stack([column, column.T])
     found = np.isfinite(both)
     known = found.any(axis=0)
-    I_B = np.where(known, np.nanmean(np.where(found, both, np.nan), axis=0, where=found), np.nan)
+    count = np.maximum(found.sum(axis=0), 1)
+    I_B = np.where(known, np.nansum(both, axis=0) / count, np.nan)
     v = np.stack([variance, variance.T])
-    sigma2 = np.where(known, np.nansum(v, axis=0) / np.maximum(found.sum(axis=0), 1) ** 2, np.nan)
+    sigma2 = np.where(known, np.nansum(v, axis=0) / count**2, np.nan)
     np.fill_diagonal(sigma2, np.diag(variance))
     covariance = np.diag(elements_of(sigma2))
     products = {f"I{'xyz'[i]}{'xyz'[j]}": (column[i, j], column[j, i]) for i in range(3) for j in range(i + 1, 3)}
@@ -144,32 +145,24 @@ def all_axes(rows: Rows, slews: list[Slew]) -> Solved:
     )  # fmt: skip
 
 
-def generalized(rows: Rows, levels: Levels, unit_kgm2: np.ndarray, frame: str, first: np.ndarray) -> Solved:
+def generalized(rows: Rows, levels: Levels, unit_kgm2: np.ndarray, frame: str) -> Solved:
     """All rows of all arcs, each arc's momentum free (it is common to the arc's rows, and no one reading gives it), a
-    constant outside torque, and every row's own noise: wheels, rates through the tensor, attitude through the momentum.
+    constant external torque, and every row's own noise: wheels, rates through the tensor, attitude through the momentum.
 
-    ``unit_kgm2`` (3, 3): covariance of h for unit variance of a wheel reading; ``first`` (6,): elements to start from.
+    ``unit_kgm2`` (3, 3): covariance of h for unit variance of a wheel reading.
     White noise is assumed; the covariance is scaled by what is left over."""
     t, w = rows.time_s, rows.motion.omega_B
     R = rotation(rows.motion.q_NB).as_matrix()
     arcs, index = np.unique(rows.arc, return_inverse=True)
-    grown = grown_by(t, R, frame)
     p = 6 + 3 * len(arcs)
     X = np.zeros((len(t), 3, p + 3))
     X[:, :, :6] = -momentum_regressor(w)
     for k in range(len(t)):
         X[k, :, 6 + 3 * index[k] : 9 + 3 * index[k]] = R[k].T
-    X[:, :, p:] = np.swapaxes(R, 1, 2) @ grown
-    elements = first
+    X[:, :, p:] = np.swapaxes(R, 1, 2) @ grown_by(t, R, frame)
+    elements = _plain_elements(rows)
     for _ in range(4):
-        I_B = tensor_of(elements)
-        L = rows.h_B + w @ I_B
-        cross = np.zeros((len(t), 3, 3))
-        for i, (a, b, sign) in enumerate([(1, 2, -1), (2, 0, -1), (0, 1, -1)]):
-            cross[:, a, b], cross[:, b, a] = sign * L[:, i], -sign * L[:, i]
-        C = levels.wheel**2 * unit_kgm2 + levels.rate**2 * I_B @ I_B.T
-        C = C + levels.attitude**2 * cross @ np.swapaxes(cross, 1, 2)
-        W = np.linalg.inv(np.linalg.cholesky(C))
+        W = np.linalg.inv(np.linalg.cholesky(_row_covariance(rows, levels, unit_kgm2, elements)))
         A, y = (W @ X).reshape(-1, p + 3), np.einsum("nij,nj->ni", W, rows.h_B).ravel()
         size = np.sqrt(np.sum(A**2, axis=0))
         size[size == 0] = 1.0
@@ -186,6 +179,25 @@ def generalized(rows: Rows, levels: Levels, unit_kgm2: np.ndarray, frame: str, f
         elements, covariance[:6, :6], information, information @ elements, residual, np.ones(len(t), bool), {}, beta[p:],
         covariance[p:, p:],
     )  # fmt: skip
+
+
+def _row_covariance(rows: Rows, levels: Levels, unit_kgm2: np.ndarray, elements: np.ndarray) -> np.ndarray:
+    """Of each row's momentum at a tensor's elements. (N, 3, 3)"""
+    I_B = tensor_of(elements)
+    L = rows.h_B + rows.motion.omega_B @ I_B
+    cross = np.zeros((len(L), 3, 3))
+    for i, (a, b, sign) in enumerate([(1, 2, -1), (2, 0, -1), (0, 1, -1)]):
+        cross[:, a, b], cross[:, b, a] = sign * L[:, i], -sign * L[:, i]
+    C = levels.wheel**2 * unit_kgm2 + levels.rate**2 * I_B @ I_B.T
+    return C + levels.attitude**2 * cross @ np.swapaxes(cross, 1, 2)
+
+
+def _plain_elements(rows: Rows) -> np.ndarray:
+    """A rough tensor to start from: momentum free, ordinary least squares."""
+    S = momentum_regressor(rows.motion.omega_B)
+    R = rotation(rows.motion.q_NB).as_matrix()
+    X = np.concatenate([-S, np.swapaxes(R, 1, 2)], axis=2).reshape(-1, 9)
+    return np.linalg.lstsq(X, rows.h_B.ravel(), rcond=1e-8)[0][:6]
 
 
 def _gained(rows: Rows, slew: Slew):

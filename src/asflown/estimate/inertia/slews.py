@@ -1,14 +1,17 @@
-"""Where the craft slews: spans of a record in which the body turns, and about which axis."""
+"""Where the craft slews: spans of a record in which the body turns, and about which axis.
+
+``subject.slews`` says whether a record is no hold.  Here every turn above the noise counts, a slow or a steady one too: what it
+tells of the inertia is counted by its sigma."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 
 from ...kit.timeline import runs
 from ...telemetry.channels import AXES
+from ..subject import without_spikes
 
 #: A slew's rate is above this share of the fastest one ...
 _SHARE = 0.05
@@ -51,7 +54,7 @@ def find_slews(time_s: np.ndarray, omega_B: np.ndarray, noise_rad_s: float) -> l
     A turn that changes its axis or its sense is parted there."""
     if len(time_s) < 5:
         return []
-    smooth = ndimage.median_filter(omega_B, size=(5, 1), mode="nearest")
+    smooth = without_spikes(omega_B)
     rate = np.linalg.norm(smooth, axis=1)
     least = max(_SHARE * rate.max(), _SIGMAS * noise_rad_s)
     moving = rate > max(_EDGE * _SHARE * rate.max(), 0.3 * _SIGMAS * noise_rad_s)

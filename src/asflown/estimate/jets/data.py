@@ -2,9 +2,9 @@
 
     y = A rho(nodes) + noise
 
-By ``momentum``: what wheels and body hold at each instant is the integral of the torque; its noise is the sensors', white.  Through
-the ``loop``: attitude error, body rate and wheels' momentum each answer to the torque as the craft's controller lets them, and
-the filter whitens them all; neither lag nor smoothing enters, but gains and filter must be right.
+By ``momentum``: what wheels and body hold at each instant is the integral of the torque; its noise is that of the sensors, white.
+Through the ``loop``: attitude error, body rate and wheel momentum each respond to the torque as the craft's controller lets them,
+and the filter whitens them all; neither lag nor smoothing enters, but gains and filter must be right.
 """
 
 from __future__ import annotations
@@ -18,23 +18,22 @@ from scipy.integrate import cumulative_trapezoid
 from ...dynamics.plume import FARTHEST_M, Jet, seen_from
 from ...kit.errors import BadInput
 from ...kit.regression import noise_sigma
-from ...telemetry.channels import AXES
 from ..fused import hats, regression
-from ..subject import samples_of, subject_of
 
 if TYPE_CHECKING:
-    from ...craft.model import Craft
+    from collections.abc import Sequence
+
     from ...dynamics.flyby import Flyby
-    from ...telemetry.telemetry import Telemetry
     from ..density import DensityResult
 
-_STEP_S = 0.25  # between nodes: a jet's cusp is seen
+_STEP_S = 0.25  # between nodes: it resolves a jet's cusp
 _BEFORE_S = 120.0  # of quiet before closest approach, to know the momentum that craft and wheels had
 
 
 @dataclass(frozen=True)
 class JetData:
-    """y (N,) and A (N, C) for densities at even nodes (C,) [s from closest approach]; ``unit``: of y, for one axis' momentum N m s, else sigma."""
+    """y (N,) and A (N, C) for densities at even nodes (C,) [s from closest approach]; ``unit`` of y: 'N m s' for the momentum of
+    one axis, else 'sigma'."""
 
     y: np.ndarray
     A: np.ndarray
@@ -46,12 +45,16 @@ class JetData:
         return float(self.nodes_s[-1])
 
 
-def by_momentum(
-    telemetry: Telemetry, craft: Craft, met: DensityResult, sources: list[Jet], closest_s: float
-) -> JetData:
-    """From the momentum of wheels and body about every axis of ``met``, less what gravity gradient gave, centred."""
-    s = samples_of(subject_of(telemetry, craft))
-    t = telemetry.seconds(s.tai_ns) - closest_s
+def by_momentum(met: DensityResult, sources: Sequence[Jet]) -> JetData:
+    """From the momentum of wheels and body about every axis of ``met``, less what gravity gradient gave, centred.
+
+    Raises BadInput where that momentum is not in the telemetry."""
+    if met.momentum is None:
+        raise BadInput(
+            "jets are fitted to the momentum that the actuators hold, and it is not in the telemetry",
+            remedy="Add wheel_rate_<WHEEL> or wheel_momentum_x, _y, _z.",
+        )
+    t = met.momentum.time_s
     used = (t >= -_BEFORE_S) & _within(met.flyby, sources, t)
     _check(t[used])
     t = t[used]
@@ -59,19 +62,19 @@ def by_momentum(
     integral = hats(t, nodes) @ np.apply_along_axis(cumulative_trapezoid, 0, np.eye(len(nodes)), dx=_STEP_S, initial=0)
     y, A = [], []
     for i, a in enumerate(met.axis):
-        H = s.momentum[used, AXES.index(a)]
+        H = met.momentum.momentum_Nms[used, i]
         if met.gravity_gradient_Nm is not None:
-            gravity = met.gravity_gradient_Nm.reshape(len(met.time_s), -1)[:, i]
+            gravity = met.about(met.gravity_gradient_Nm)[:, i]
             H = H - np.interp(t, met.time_s, cumulative_trapezoid(gravity, met.time_s, initial=0))
         column = integral * met.per_density(a, nodes)
-        # several axes are weighed by their noise
+        # several axes are weighted by their noise
         sigma = 1.0 if len(met.axis) == 1 else noise_sigma(t, H, degree=3, half_width=4 * float(np.median(np.diff(t))))
         y.append((H - H.mean()) / sigma)
         A.append((column - column.mean(axis=0)) / sigma)
     return JetData(np.concatenate(y), np.concatenate(A), nodes, "N m s" if len(met.axis) == 1 else "sigma")
 
 
-def through_loop(met: DensityResult, sources: list[Jet], closest_s: float) -> JetData:
+def through_loop(met: DensityResult, sources: Sequence[Jet]) -> JetData:
     """From all telemetry that the fused torque of ``met`` rests on, less what gravity gradient does.
 
     Raises BadInput where that torque is not the fused one."""
@@ -87,17 +90,17 @@ def through_loop(met: DensityResult, sources: list[Jet], closest_s: float) -> Je
     for i, a in enumerate(met.axis):
         axis = met.evidence[a]
         if met.gravity_gradient_Nm is not None:
-            gravity = met.gravity_gradient_Nm.reshape(len(met.time_s), -1)[:, i]
-            axis = axis.without(np.interp(axis.time_s - closest_s, met.time_s, gravity))
-        # what came later belongs to a torque that no node stands for, and quantities taken as known would be bent to fit it
-        axis = axis.until(closest_s + nodes[-1])
-        r = regression(axis, nodes + closest_s, 1e-6 * axis.levels.torque_Nm)
+            gravity = met.about(met.gravity_gradient_Nm)[:, i]
+            axis = axis.without(np.interp(axis.time_s - met.closest_s, met.time_s, gravity))
+        # later measurements respond to a torque beyond the last node, which quantities taken as known would be bent to fit
+        axis = axis.until(met.closest_s + nodes[-1])
+        r = regression(axis, nodes + met.closest_s, 1e-6 * axis.levels.torque_Nm)
         y.append(r.y)
         A.append(r.W * met.per_density(a, nodes))
     return JetData(np.concatenate(y), np.concatenate(A), nodes, "sigma")
 
 
-def _within(flyby: Flyby, sources: list[Jet], time_s) -> np.ndarray:
+def _within(flyby: Flyby, sources: Sequence[Jet], time_s) -> np.ndarray:
     return np.max([seen_from(j, flyby, time_s)[0] for j in sources], axis=0) <= FARTHEST_M
 
 

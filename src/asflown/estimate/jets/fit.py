@@ -1,18 +1,18 @@
-"""Jets of a plume fitted to the telemetry of a craft that flew through them (004 section VII, eqs 23, 26 to 28).
+"""Jets of a plume fitted to the telemetry of a craft that flew through them (plume paper section VII, eqs 23, 26 to 28).
 
-004 fits its six parameters to a reconstructed density, after smoothing and a loop's lag (``printed``).  Neither is needed: momentum that
-wheels and body hold is the integral of the torque, sample by sample (``momentum``), and through the loop everything that is
-telemetered answers to it (``forward``).  Both are linear in the density along the flyby (``jets_data``), so
+The plume paper fits its six parameters to a reconstructed density, after smoothing and a loop's lag (``printed``).  Neither is
+needed: the momentum that wheels and body hold is the integral of the torque, sample by sample (``momentum``), and through the
+loop every telemetered channel responds to it (``forward``).  Both are linear in the density along the flyby (``data``), so
 
     y = A rho,    rho = sum_j K_j (R_E/r_j)^1.5 exp(-(theta_j/K_theta_j)^n)
 
-Likelihood of all widths at once (``jets_surface``), intervals by its profiles, and models of fewer jets and of one common width
-beside, by Schwarz's criterion.  Noise that has a memory counts by how many independent samples it is worth.
+The likelihood of all widths is computed at once (``surface``), with intervals by its profiles; models of fewer jets and of one
+common width are compared by Schwarz's criterion.  Correlated noise counts by its effective sample size.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -20,12 +20,16 @@ import numpy as np
 from scipy.stats import f as fisher
 
 from ...dynamics.flyby import Flyby, flyby_called
-from ...dynamics.plume import Jet, jet_density, model_error, plume_density, sources_passed
-from ...kit.errors import BadInput, some_of
+from ...dynamics.plume import Jet, model_error, sources_passed
+from ...kit.doubts import Doubt, Doubts
+from ...kit.errors import BadInput, check_choice, some_of
 from ...kit.regression import memory
-from ..density import density
-from ..subject import check_on_times, slews, thrusters_firing
-from .data import JetData, by_momentum, through_loop
+from ...kit.result import recorded
+from ..density import Asked, DragGiven, density_along
+from ..subject import check_on_times, subject_of
+from .data import by_momentum, through_loop
+from .doubts import identified_doubts, memory_doubts, misfit_doubts, score_doubts
+from .form import WIDTHS, JetForm, JetRegression
 from .printed import simplex
 from .result import JetsResult, Score, Source
 from .surface import WIDTHS_RAD, Surface
@@ -33,106 +37,205 @@ from .surface import WIDTHS_RAD, Surface
 if TYPE_CHECKING:
     from ...craft.model import Craft
     from ...telemetry.telemetry import Telemetry
+    from ..density import DensityResult
+    from ..subject import Subject
 
-WIDTHS, FITS = ("own", "common"), ("momentum", "forward", "printed")
-#: Combinations of widths grow as 44 to the power of the sources; densities not negative as 2 to it.
-_MOST_OWN, _MOST_COMMON = 3, 8
+FITS = ("momentum", "forward", "printed")
 #: Widths of the second lattice, over what lies within this much of the least misfit in units of sigma squared: beyond any 95 %.
 _FINER, _REACH = 30, 12.0
 
 
+@recorded
 def jets(
-    telemetry: Telemetry, craft: Craft, flyby: Flyby | str, closest_approach: str | float, *, names=None, sources=None,
-    widths: str = "own", fit: str = "momentum", power: float = 1, angle: str = "plane", **drag,
-) -> JetsResult:  # fmt: skip
-    """Densities and widths of sources that explain what a craft went through in a flyby.
+    telemetry: Telemetry,
+    craft: Craft,
+    flyby: Flyby | str,
+    closest_approach: str | float,
+    *,
+    names=None,
+    sources: tuple[Jet, ...] | None = None,
+    widths: str = "own",
+    fit: str = "momentum",
+    power: float = 1,
+    angle: str = "plane",
+    axis: str | None = None,
+    method: str | None = None,
+    area_m2: float | None = None,
+    arm_m: float | None = None,
+    drag_table=None,
+    velocity_B=None,
+    up_B=None,
+) -> JetsResult:
+    """Densities and widths of the jets that explain what a craft met in a flyby (plume paper eqs 26 to 28).
 
-    ``names``: of the published sources (Alexandria, Cairo, Damascus; all).  ``sources``: others in their place, as the flyby
-    passes them.  ``widths``: each jet its own, or one common.  ``fit``: to momentum, through the loop (forward), or as 004
-    (printed).  ``power`` n, ``angle``: see ``dynamics.plume.jet_density``.  ``drag``: axis, area, arm, table and directions, and the method of
-    the density set beside, as in ``density``.
+    Parameters
+    ----------
+    telemetry : Telemetry
+        Wheel rates (or momentum) and body rates, from two minutes before closest approach to two minutes after, in a hold.
+    craft : Craft
+        Its inertia, and under [aerodynamics] its drag.
+    flyby : Flyby or str
+        The path past the moon, or the name of a known one: 'E3', 'E4', 'E9'.
+    closest_approach : str or float
+        UTC, or seconds from the telemetry's epoch.
+    names : sequence of str, optional
+        Which sources are fitted; all unless given.
+    sources : tuple of Jet, optional
+        As the flyby passes them; the published ones (Alexandria, Cairo, Damascus) unless given.
+    widths : {'own', 'common'}
+        One width for each jet, at most three jets, or one for all of at most eight.
+    fit : {'momentum', 'forward', 'printed'}
+        To momentum; through the loop to all channels, which needs the fused torque; or the plume paper's simplex on the density.
+    power : float
+        n of exp(-(angle / width)^n), 0.5 to 4.
+    angle : {'plane', 'space'}
+        The angle from a jet's axis is taken in the flyby's plane, as in the plume paper, or in space.
+    axis, method, area_m2, arm_m, drag_table, velocity_B, up_B
+        Of the density reconstructed without jets: see ``density``.
 
-    Raises BadInput where ``density`` does, for unknown or too many sources, in a slew, and where the record ends before the plume."""
-    for what, value, allowed in (("widths", widths, WIDTHS), ("fit", fit, FITS)):
-        if value not in allowed:
-            raise BadInput(f"{what} {value!r} is not known", remedy=f"Choose one of: {some_of(allowed)}.")
-    if not 0.5 <= power <= 4:
-        raise BadInput(f"a power of {power:g} is no jet's", remedy="004's is 1, or 2 as in its eq 24.")
-    if slews(telemetry):
-        raise BadInput("the craft slews in this record", remedy="Narrow the span to the flyby with --start and --stop.")
-    if thrusters_firing(telemetry):
-        raise BadInput(
-            "thrusters fire in this record, and jets are fitted to the momentum of wheels",
-            remedy="Use asflown density, which balances on-times.",
-        )
-    check_on_times(telemetry, craft)
+    Returns
+    -------
+    JetsResult
+        Densities [kg/m3] and widths [rad] with 95 % intervals; the scale's sigma is not in the intervals.
+
+    Raises
+    ------
+    BadInput
+        Where ``density`` does, for unknown or too many sources, in a slew, where thrusters fire, and for a record that ends
+        before the plume.
+    """
+    check_choice(fit, FITS, "fit")
+    form = JetForm(widths, power, angle)
     where = flyby_called(flyby) if isinstance(flyby, str) else flyby
-    sources = _wanted(where, names, sources)
-    most = _MOST_OWN if widths == "own" else _MOST_COMMON
-    if len(sources) > most:
+    subject = subject_of(telemetry, craft)
+    _check_held(subject)
+    wanted = _wanted(where, names, sources)
+    if len(wanted) > form.most:
         raise BadInput(
-            f"{len(sources)} sources with {widths} widths are more than the {most} that can be told apart here",
+            f"{len(wanted)} sources with {widths} widths are more than the {form.most} that can be fitted",
             remedy="Use --widths common, or fewer sources.",
         )
-    met = density(telemetry, craft, where, closest_approach, cusps=False, **drag)
+    drag = DragGiven(axis, area_m2, arm_m, drag_table)
+    asked = Asked(where, closest_approach, drag, method, velocity_B=velocity_B, up_B=up_B, cusps=False)
+    met = density_along(subject, asked)
+    if fit != "forward":
+        _check_rates(subject, met)
+    data = through_loop(met, wanted) if fit == "forward" else by_momentum(met, wanted)
+    problem = JetRegression(data, where, wanted, form)
+    return _printed(met, problem) if fit == "printed" else _result(met, problem, fit)
+
+
+def _check_held(subject: Subject) -> None:
+    """Raises BadInput where the craft slews or thrusters hold it."""
+    if subject.slewing:
+        raise BadInput("the craft slews in this record", remedy="Narrow the span to the flyby with --start and --stop.")
+    if subject.firing:
+        raise BadInput(
+            "thrusters fire in this record, and jets are fitted to the momentum of wheels",
+            remedy="Use asflown density, which takes on-times.",
+        )
+    check_on_times(subject.telemetry, subject.craft.craft)
+
+
+def _check_rates(subject: Subject, met: DensityResult) -> None:
     for a in met.axis:
-        if fit != "forward" and f"body_rate_{a}" not in telemetry:
+        if f"body_rate_{a}" not in subject.telemetry:
             raise BadInput(
                 "jets are fitted to the momentum of wheels and body, and the body's is not known",
-                file=telemetry.source or None,
+                file=subject.telemetry.source or None,
                 channel=f"body_rate_{a}",
                 remedy="Add the body rates.",
             )
-    closest_s = float(telemetry.seconds(telemetry.moment(closest_approach)))
-    data = (
-        through_loop(met, sources, closest_s)
-        if fit == "forward"
-        else by_momentum(telemetry, craft, met, sources, closest_s)
-    )
-    columns = _columns(sources, where, data, power, angle, np.tile(WIDTHS_RAD, (len(sources), 1)))
-    surface = Surface(data.y, columns, widths == "common")
-    finer = surface.finer(surface.least * (1 + _REACH / len(data.y)), _FINER)
-    surface = Surface(data.y, _columns(sources, where, data, power, angle, finer), widths == "common", finer)
-    doubts: list[str] = []
-    if fit == "printed":
-        sources, doubts = simplex(met, sources, widths == "common", data.last_s, power=power, angle=angle)
-    else:
-        sources = _fitted(surface, sources)
-    left = data.y - data.A @ plume_density(sources, where, data.nodes_s, power=power, angle=angle)
+
+
+@dataclass(frozen=True)
+class _Residual:
+    """What jets leave of the telemetry: (N,), how many samples count as one, and the effective sample size."""
+
+    left: np.ndarray
+    alike: float
+    worth: float
+
+
+def _residual(problem: JetRegression, jets: tuple[Jet, ...]) -> _Residual:
+    """Raises BadInput where too few independent samples are left for the parameters."""
+    data = problem.data
+    left = data.y - problem.answer(jets)
     alike = memory(left)
-    worth = len(data.y) / alike
-    free = len(sources) + (1 if widths == "common" else len(sources)) + 1
+    worth, free = len(data.y) / alike, problem.form.free(len(jets))
     if worth < free + 3:
         raise BadInput(
-            f"{len(data.y)} samples worth {worth:.0f} independent ones do not carry {free} parameters",
+            f"{free} parameters need more than the effective sample size of {worth:.0f} ({len(data.y)} samples)",
             remedy="Take a longer record, fewer sources (--sources), or --widths common.",
         )
-    # a profile's limit where sigma is unknown too: Fisher's in place of chi squared
-    limit = surface.least * (1 + fisher.ppf(0.95, 1, worth - free) / (worth - free))
-    misfit = _misfit_doubts(data, left, free)
-    found = tuple(
-        Source(j, (None, None), (None, None))
-        if fit == "printed"
-        else replace(_source(surface, i, j, limit), explained=not misfit)
-        for i, j in enumerate(sources)
-    )
-    inside = (met.time_s >= data.nodes_s[0]) & (met.time_s <= data.last_s) & np.isfinite(met.density_kgm3)
-    model = plume_density(sources, where, met.time_s, power=power, angle=angle)
-    scores = () if fit == "printed" else _scores(sources, columns, data.y, worth)
-    doubts += [
-        *(() if fit == "printed" else _doubts(found, scores, widths, alike)),
+    return _Residual(left, alike, worth)
+
+
+def _result(met: DensityResult, problem: JetRegression, fit: str) -> JetsResult:
+    """By the likelihood of all widths, with intervals."""
+    form, data, count = problem.form, problem.data, len(problem.sources)
+    columns = problem.columns(np.tile(WIDTHS_RAD, (count, 1)))
+    surface = problem.surface(columns)
+    finer = surface.finer(surface.least * (1 + _REACH / len(data.y)), _FINER)
+    surface = problem.surface(problem.columns(finer), finer)
+    fitted = _fitted(surface, problem.sources)
+    residual = _residual(problem, fitted)
+    free = form.free(count)
+    # the limit of a profile whose sigma is unknown too: Fisher's in place of chi-squared
+    limit = surface.least * (1 + fisher.ppf(0.95, 1, residual.worth - free) / (residual.worth - free))
+    misfit = misfit_doubts(data, residual.left, free)
+    found = tuple(replace(_source(surface, i, j, limit), explained=not misfit) for i, j in enumerate(fitted))
+    scores = _scores(problem, columns, residual.worth)
+    doubts = [
         *misfit,
-        *met.doubts,
+        *memory_doubts(residual.alike),
+        *identified_doubts(found, form),
+        *score_doubts(scores, count, form),
     ]
+    return _assembled(met, problem, fit, found, residual, scores, doubts)
+
+
+def _printed(met: DensityResult, problem: JetRegression) -> JetsResult:
+    """The plume paper's simplex, without intervals."""
+    fitted, doubts = simplex(met, problem.sources, problem.form, problem.data.last_s)
+    found = tuple(Source(j) for j in fitted)
+    residual = _residual(problem, fitted)
+    misfit = misfit_doubts(problem.data, residual.left, problem.form.free(len(fitted)))
+    return _assembled(met, problem, "printed", found, residual, (), [*misfit, *doubts])
+
+
+def _assembled(
+    met: DensityResult, problem: JetRegression, fit: str, found: tuple[Source, ...], residual: _Residual,
+    scores: tuple[Score, ...], doubts: list[Doubt],
+) -> JetsResult:  # fmt: skip
+    form, data, t = problem.form, problem.data, met.time_s
+    jets = tuple(s.jet for s in found)
+    model = form.together(jets, problem.flyby, t)
+    inside = (t >= data.nodes_s[0]) & (t <= data.last_s) & np.isfinite(met.density_kgm3)
+    of_momentum = met.momentum.doubts if fit != "forward" and met.momentum is not None else ()
     return JetsResult(
-        density=met, sources=found, correlation=_correlation(sources, where, data, power, angle, widths),
-        rms_kgm3=model_error(met.time_s[inside], model[inside], met.density_kgm3[inside]), scores=scores, widths=widths, fit=fit,
-        power=power, angle=angle, model_kgm3=model, rms=float(np.sqrt(np.mean(left**2))), unit=data.unit, samples=len(data.y), worth=worth,
-        doubts=tuple(dict.fromkeys(doubts)),
-    )  # fmt: skip
+        craft=met.craft,
+        epoch=met.epoch,
+        method=fit,
+        variant="printed" if fit == "printed" else "corrected",
+        density=met,
+        sources=found,
+        form=form,
+        correlation=_correlation(problem, jets),
+        rms_kgm3=model_error(t[inside], model[inside], met.density_kgm3[inside]),
+        scores=scores,
+        model_kgm3=model,
+        each_kgm3=np.array([form.of(j, problem.flyby, t) for j in jets]),
+        rms=float(np.sqrt(np.mean(residual.left**2))),
+        unit=data.unit,
+        samples=len(data.y),
+        effective_samples=residual.worth,
+        inputs=met.inputs,
+        doubts=Doubts([*doubts, *met.doubts.passed_on_by("density"), *of_momentum]),
+    )
 
 
-def _wanted(flyby: Flyby, names, sources) -> list[Jet]:
+def _wanted(flyby: Flyby, names, sources) -> tuple[Jet, ...]:
     """The sources to fit, as the flyby passes them."""
     every = sources_passed(flyby, sources)
     called = {j.name.casefold(): j.name for j in every}
@@ -140,29 +243,17 @@ def _wanted(flyby: Flyby, names, sources) -> list[Jet]:
     if not wanted or len(set(wanted)) != len(wanted) or not set(wanted) <= {j.name for j in every}:
         raise BadInput(
             f"the sources {some_of(wanted)} are not each one of those {'published' if sources is None else 'given'}",
-            remedy=f"Choose of: {some_of(j.name for j in every)}.",
+            remedy=f"Choose from: {some_of(j.name for j in every)}.",
         )
-    return [j for j in every if j.name in wanted]
+    return tuple(j for j in every if j.name in wanted)
 
 
-def _columns(sources, flyby: Flyby, data: JetData, power: float, angle: str, widths_rad: np.ndarray) -> np.ndarray:
-    """What each jet of unit density gives, for every one of its widths (J, W). (J, W, N)"""
-    shapes = [
-        [
-            jet_density(replace(j, density_kgm3=1.0, width_rad=w), flyby, data.nodes_s, power=power, angle=angle)
-            for w in widths
-        ]
-        for j, widths in zip(sources, widths_rad, strict=True)
-    ]
-    return np.array(shapes) @ data.A.T
-
-
-def _fitted(surface: Surface, sources) -> list[Jet]:
+def _fitted(surface: Surface, sources: tuple[Jet, ...]) -> tuple[Jet, ...]:
     """The best jets of a surface."""
-    return [
+    return tuple(
         replace(j, density_kgm3=float(K), width_rad=float(w))
         for j, K, w in zip(sources, surface.densities[surface.best], surface.widths(), strict=True)
-    ]
+    )
 
 
 def _source(surface: Surface, jet_number: int, jet: Jet, limit: float) -> Source:
@@ -194,17 +285,16 @@ def _crossing(surface: Surface, jet_number: int, best: float, end: float, limit:
     return 0.5 * (inner + outer)
 
 
-def _correlation(sources, flyby, data: JetData, power, angle, widths) -> np.ndarray:
+def _correlation(problem: JetRegression, jets: tuple[Jet, ...]) -> np.ndarray:
     """Of densities, then widths, by the curvature at the fit; NaN for the width of a jet that is not there."""
-    n = len(sources)
+    n, common = len(jets), problem.form.common
 
     def seen(x):
-        w = x[n:] if widths == "own" else np.repeat(x[n:], n)
-        jets = [replace(j, density_kgm3=K, width_rad=v) for j, K, v in zip(sources, x[:n], w, strict=True)]
-        return data.A @ plume_density(jets, flyby, data.nodes_s, power=power, angle=angle)
+        w = np.repeat(x[n:], n) if common else x[n:]
+        return problem.answer([replace(j, density_kgm3=K, width_rad=v) for j, K, v in zip(jets, x[:n], w, strict=True)])
 
-    K = np.array([j.density_kgm3 for j in sources])
-    w = np.array([j.width_rad for j in sources]) if widths == "own" else np.array([sources[0].width_rad])
+    K = np.array([j.density_kgm3 for j in jets])
+    w = np.array([j.width_rad for j in (jets[:1] if common else jets)])
     x, steps = np.r_[K, w], np.r_[np.full(n, 1e-3 * max(K.max(), 1e-15)), 1e-3 * w]
     J = np.stack([(seen(x + h * e) - seen(x - h * e)) / 2 for h, e in zip(steps, np.eye(len(x)), strict=True)], axis=1)
     known = np.linalg.norm(J, axis=0) > 0
@@ -216,54 +306,17 @@ def _correlation(sources, flyby, data: JetData, power, angle, widths) -> np.ndar
     return found
 
 
-def _scores(sources, columns, y, worth: float) -> tuple[Score, ...]:
+def _scores(problem: JetRegression, columns, worth: float) -> tuple[Score, ...]:
     """Every choice of these sources, widths common and own, by Schwarz's criterion; the least is the best."""
+    sources, y = problem.sources, problem.data.y
     found = []
     for n in range(1, len(sources) + 1):
+        forms = [JetForm(w) for w in WIDTHS if n <= JetForm(w).most and (n > 1 or w == "own")]
         for some in combinations(range(len(sources)), n):
-            for widths in WIDTHS if 1 < n <= _MOST_OWN else WIDTHS[1:] if n > _MOST_OWN else WIDTHS[:1]:
-                least = Surface(y, columns[list(some)], widths == "common").least
-                free = n + (n if widths == "own" else 1) + 1
+            for form in forms:
+                least, free = Surface(y, columns[list(some)], common=form.common).least, form.free(n)
                 names = tuple(sources[i].name for i in some)
-                found.append(Score(names, widths, free, float(worth * np.log(least / len(y)) + free * np.log(worth))))
+                bic = float(worth * np.log(least / len(y)) + free * np.log(worth))
+                found.append(Score(names, form.widths, free, bic))
     best = min(s.bic for s in found)
     return tuple(sorted((replace(s, bic=s.bic - best) for s in found), key=lambda s: s.bic))
-
-
-def _doubts(found, scores, widths: str, alike: float) -> list[str]:
-    doubts = []
-    width = "; its width means nothing" if widths == "own" else ""
-    for s in found:
-        if not s.explained:
-            continue
-        if not s.density_known:
-            doubts.append(
-                f"{s.jet.name} is not identified: its density may be zero, and an upper limit is all there is{width}"
-            )
-        elif not s.width_known:
-            doubts.append(f"{s.jet.name}'s width is not identified: its interval is open, a limit is all there is")
-    best = scores[0]
-    own = next(s for s in scores if len(s.names) == len(found) and s.widths == (widths if len(found) > 1 else "own"))
-    if own.bic > 2:
-        doubts.append(
-            f"fewer parameters say as much: {' and '.join(best.names)} with {best.widths} width{'s' if best.widths == 'own' and len(best.names) > 1 else ''} "
-            f"({best.free} parameters) is better by {own.bic:.1f} of Schwarz's criterion"
-        )
-    if alike > 2:
-        doubts.append(
-            f"residuals follow each other ({alike:.1f} are worth one): these jets do not explain all of the momentum"
-        )
-    return doubts
-
-
-def _misfit_doubts(data: JetData, left: np.ndarray, free: int) -> list[str]:
-    """Rows of unit noise say by themselves whether jets explain them."""
-    if data.unit != "sigma":
-        return []
-    square, freedom = float(left @ left), len(left) - free
-    if square < freedom + 5 * np.sqrt(2 * freedom):
-        return []
-    return [
-        f"these jets do not explain the telemetry (chi-square {square:.0f} for {freedom}), so none is identified and intervals mean nothing: "
-        "their form, the loop's gains, or another torque?"
-    ]

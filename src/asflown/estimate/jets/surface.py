@@ -21,7 +21,7 @@ class Surface:
     y (N,); columns (J, W, N): what each jet of unit density gives, for each of its widths (J, W), those of ``WIDTHS_RAD`` unless
     given.  ``common``: all jets have one width."""
 
-    def __init__(self, y: np.ndarray, columns: np.ndarray, common: bool, widths_rad: np.ndarray | None = None):
+    def __init__(self, y: np.ndarray, columns: np.ndarray, *, common: bool, widths_rad: np.ndarray | None = None):
         self.jets, self.count = columns.shape[:2]
         self.common = common
         self.widths_rad = np.tile(WIDTHS_RAD, (self.jets, 1)) if widths_rad is None else widths_rad

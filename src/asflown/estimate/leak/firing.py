@@ -1,8 +1,12 @@
 """What thrusters gave, by their counters: ordered on-times and pulses to impulses about the centre of mass.
 
-On-times come more seldom than rates.  Where a thruster fires between two readings, when it fired is not known: of the
-instants in between only those nearest to a reading count.  What a pulse still owes when its reading is taken (its delay
-and its tail) is noise of that instant.
+On-times are sampled less often than rates.  Where a thruster fires between two readings, it is not known when: of the
+instants in between only those nearest to a reading are used.  What a pulse has yet to give when its reading is taken (its
+delay and its tail) is noise of that instant.
+
+The room ``firing`` reads the same counters for a thrust, and otherwise: it guesses pulses that are not counted from the whole
+record, interpolates counters of different instants, and refuses a record without the on-time of every thruster.  A monitor takes
+a record as it grows, so that nothing said may change with what follows, and goes on with the counters there are.
 """
 
 from __future__ import annotations
@@ -13,16 +17,34 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...dynamics.pulses import Valve, moment_matrix
-from ...kit.errors import BadInput, some_of
+from ...kit.doubts import Doubts, Kind, Severity
+from ...kit.errors import BadInput
 from ...kit.timeline import NS
 from ...telemetry.attitude import together
+from ..firing import control_step_s
 
 if TYPE_CHECKING:
     from ...craft.model import Craft
     from ...telemetry.telemetry import Telemetry
 
-#: Shortest pulse where the craft's control period is not known. [s]
-_SHORTEST_PULSE = 0.125
+NO_ON_TIMES = Kind(
+    "leak.no-on-times", Severity.CAUTION, "no on-times are in the telemetry: thrusters are assumed not to fire",
+    "Add on_time_<THRUSTER> of every thruster, cumulative in seconds.",
+)  # fmt: skip
+ON_TIMES_MISSING = Kind(
+    "leak.on-times-missing", Severity.CAUTION, "there is no on-time of {thrusters}: they are assumed not to fire",
+    "Add on_time_<THRUSTER> of every thruster, cumulative in seconds.",
+)  # fmt: skip
+COUNTERS_JUMP = Kind(
+    "leak.counters-jump", Severity.CAUTION,
+    "on-times or pulse counts fall or jump {jumps} times, first at {first}: the momentum gained in those steps is not used",
+    "Declare the wrap in a channel dictionary, or divide the record at the reset.",
+)  # fmt: skip
+PULSES_NOT_COUNTED = Kind(
+    "leak.pulses-not-counted", Severity.NOTE,
+    "pulses are not counted for every thruster: the number expected for that on-time is used, with cycles on at random",
+    "Add pulse_count_<THRUSTER> of every thruster.",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -50,7 +72,6 @@ def geometry_of(craft: Craft) -> Geometry:
             remedy='Give it: --cm "x,y,z" in m, in the axes of the thrusters\' positions.',
         )
     along = np.array([t.direction for t in craft.thrusters], float)
-    period = craft.wheel_controller.period if craft.wheel_controller else _SHORTEST_PULSE
     return Geometry(
         names=tuple(t.name for t in craft.thrusters),
         columns=moment_matrix([t.position for t in craft.thrusters], along, craft.stated_center),
@@ -58,7 +79,7 @@ def geometry_of(craft: Craft) -> Geometry:
         delay_s=np.array([t.delay for t in craft.thrusters]),
         rise_s=np.array([t.rise for t in craft.thrusters]),
         fall_s=np.array([t.fall for t in craft.thrusters]),
-        shortest_s=period,
+        shortest_s=control_step_s(craft),
     )
 
 
@@ -80,7 +101,7 @@ class Firing:
     pulses: np.ndarray
     breaks: np.ndarray
     counted: np.ndarray  # (j,), by a pulse counter; else their number is a guess
-    doubts: tuple[str, ...] = ()
+    doubts: Doubts = Doubts()
 
     def at(self, tai_ns, geometry: Geometry, thrust_N: float):
         """Which instants count (M of N, indices), and there: impulse, pulses, variance of momentum (M, 3, 3) and breaks."""
@@ -115,24 +136,40 @@ class Firing:
 
 
 def firing_of(tlm: Telemetry, geometry: Geometry, thrust_N: float) -> Firing:
-    named = [*tlm.members("on_time"), *tlm.members("pulse_count")]
-    if unknown := [n for n in dict.fromkeys(named) if n not in geometry.names]:
-        raise BadInput(
-            f"the craft has no thruster {unknown[0]!r}",
-            file=tlm.source or None,
-            channel=next(c.name for c in tlm.channels.values() if c.member == unknown[0]),
-            remedy=f"Its thrusters: {some_of(geometry.names)}. Rename the column, or name the right --craft.",
-        )
+    """Counters of every thruster, as impulses of a steady thrust.
+
+    Raises BadInput for on-times never known together."""
     timed = [n for n in geometry.names if f"on_time_{n}" in tlm]
-    j, none = len(geometry.names), np.zeros(0, np.int64)
-    nothing = np.zeros((0, j))
+    j, doubts = len(geometry.names), []
     if not timed:
-        doubt = "no on-times are in the telemetry: thrusters are taken not to fire"
-        return Firing(none, nothing, nothing, nothing, np.zeros(0), np.ones(j, bool), (doubt,))
-    doubts = []
-    if len(timed) < j:
-        missing = [n for n in geometry.names if n not in timed]
-        doubts.append(f"no on-time of {some_of(missing)}: taken not to fire")
+        nothing = np.zeros((0, j))
+        return Firing(
+            np.zeros(0, np.int64), nothing, nothing, nothing, np.zeros(0), np.ones(j, bool), Doubts([NO_ON_TIMES()])
+        )
+    if missing := [n for n in geometry.names if n not in timed]:
+        doubts.append(ON_TIMES_MISSING(thrusters=missing))
+    tai_ns, on, counts, counted = _readings(tlm, geometry, timed)
+    used, interval = np.diff(on, axis=0), np.diff(tai_ns)[:, None] / NS
+    # pulses where they are not counted: runs of cycles on, cycles being on by chance as often as the on-time says
+    pulses = np.maximum(used / geometry.shortest_s * (1 - used / interval), 0.0)
+    pulses[:, counted] = np.diff(counts[:, counted], axis=0)
+    broken = (
+        (used < 0).any(axis=1) | (used > 1.05 * interval + geometry.shortest_s).any(axis=1) | (pulses < 0).any(axis=1)
+    )
+    if broken.any():
+        first = tlm.describe_time(int(tai_ns[1:][broken][0]))
+        doubts.append(COUNTERS_JUMP(jumps=int(broken.sum()), first=first))
+    if (used > 0).any() and counted.sum() < len(timed):
+        doubts.append(PULSES_NOT_COUNTED())
+    used[broken], pulses[broken] = 0.0, 0.0
+    impulse = thrust_N * pulse_impulse(used, pulses, geometry.delay_s, geometry.rise_s, geometry.fall_s)
+    on, given, begun, breaks = (_so_far(v) for v in (used, impulse, pulses, broken.astype(float)))
+    return Firing(tai_ns, on, given, begun, breaks, counted, Doubts(doubts))
+
+
+def _readings(tlm: Telemetry, geometry: Geometry, timed: list[str]):
+    """Instants (K,) at which all counters are known, on-times and pulse counts there (K, j), and which thrusters' pulses are
+    counted (j,).  Pulse counts known at fewer than half of the on-times' instants are not used."""
     on_names, counted = [f"on_time_{n}" for n in timed], [n for n in timed if f"pulse_count_{n}" in tlm]
     tai_ns, values = together(tlm, [*on_names, *(f"pulse_count_{n}" for n in counted)])
     only, on_only = together(tlm, on_names)
@@ -140,35 +177,16 @@ def firing_of(tlm: Telemetry, geometry: Geometry, thrust_N: float) -> Firing:
         tai_ns, values, counted = only, on_only, []
     if len(tai_ns) < 2:
         raise BadInput(
-            "the thrusters' on-times are never known together",
+            "the thrusters' on-times are never known at the same instant",
             channel=on_names[0],
             remedy="Sample them at the same instants, or take a longer record.",
         )
-    on, where = np.zeros((len(tai_ns), j)), [geometry.names.index(n) for n in timed]
-    on[:, where] = values[:, : len(timed)]
-    used = np.diff(on, axis=0)
-    interval = np.diff(tai_ns)[:, None] / NS
-    # pulses where they are not counted: runs of cycles on, cycles being on by chance as often as the on-time says
-    pulses = np.maximum(used / geometry.shortest_s * (1 - used / interval), 0.0)
-    in_count = np.isin(geometry.names, counted)
-    if counted:
-        pulses[:, in_count] = np.diff(values[:, len(timed) :], axis=0)
-    broken = (
-        (used < 0).any(axis=1) | (used > 1.05 * interval + geometry.shortest_s).any(axis=1) | (pulses < 0).any(axis=1)
-    )
-    if broken.any():
-        doubts.append(
-            f"on-times or pulse counts fall or jump {int(broken.sum())} times, first at "
-            f"{tlm.describe_time(int(tai_ns[1:][broken][0]))}: momentum is taken up anew there"
-        )
-    if (used > 0).any() and len(counted) < len(timed):
-        doubts.append("pulses are not counted for every thruster: their number is what such an on-time lets expect")
-    used[broken], pulses[broken] = 0.0, 0.0
-    impulse = thrust_N * pulse_impulse(used, pulses, geometry.delay_s, geometry.rise_s, geometry.fall_s)
+    on, counts = np.zeros((2, len(tai_ns), len(geometry.names)))
+    on[:, np.isin(geometry.names, timed)] = values[:, : len(timed)]
+    counts[:, np.isin(geometry.names, counted)] = values[:, len(timed) :]
+    return tai_ns, on, counts, np.isin(geometry.names, counted)
 
-    def so_far(steps):
-        return np.concatenate([np.zeros((1, *steps.shape[1:])), np.cumsum(steps, axis=0)])
 
-    return Firing(
-        tai_ns, so_far(used), so_far(impulse), so_far(pulses), so_far(broken.astype(float)), in_count, tuple(doubts)
-    )
+def _so_far(steps) -> np.ndarray:
+    """Sums from the first reading on, which is zero; one row more than ``steps``."""
+    return np.concatenate([np.zeros((1, *steps.shape[1:])), np.cumsum(steps, axis=0)])

@@ -4,9 +4,9 @@ The filter knows momentum, the steady torque, and what is only roughly known bef
 thruster, centre of mass, inertia, spin inertia.  Its innovations are white while nothing changes.  A change that begins at
 some instant adds a known signature to them, G per unit: with S their covariance
 
-    d = sum G' S^-1 v      c = sum G' S^-1 G      log likelihood ratio  l = max(d, 0)^2 / 2c      (Willsky and Jones 1976)
+    d = sum G' S^-1 v      c = sum G' S^-1 G      log likelihood ratio  l = max(d, 0)^2 / 2c      (Willsky & Jones 1976)
 
-for each instant at which it may have begun and each of the thrusters leaking (along its column) or weak (against its
+for each instant at which it may have begun, and each of the thrusters leaking (along its column) or weak (against its
 pulses).  Instants are thinned with age, so that memory and work do not grow with the record.
 """
 
@@ -32,25 +32,24 @@ if TYPE_CHECKING:
 _PER_OCTAVE = 8
 _UNKNOWN = 1e3  # sigma of momentum where nothing is known of it, in sigmas of a reading
 
-
-#: Law of false alarms, ln(rate an instant) = OFFSET + POWER ln h - h for a threshold h: studies/leak_threshold.py.
-OFFSET, POWER = 0.0, 0.5
+#: Law of false alarms, ln(rate an instant) = EXPONENT ln h - h for a threshold h: studies/leak_threshold.py.
+_EXPONENT = 0.5
 _MOST_OFTEN = 0.05  # an instant; the law has been seen to hold below it
 
 
 def threshold_for(rate_per_instant: float) -> float:
-    """Log likelihood ratio that noise alone exceeds so often.  Raises BadInput where that is at every few instants."""
+    """Log likelihood ratio that noise alone exceeds at this rate.  Raises BadInput for a rate of one in a few instants."""
     if rate_per_instant > _MOST_OFTEN:
         raise BadInput(
-            f"{rate_per_instant:g} false alarms an instant are no monitor",
+            f"{rate_per_instant:g} false alarms an instant are too many for a monitor",
             remedy="Give a lower --false-alarms: it counts alarms an hour.",
         )
     wanted = np.log(rate_per_instant)
-    return float(brentq(lambda h: OFFSET + POWER * np.log(h) - h - wanted, 1.0, 200.0))
+    return float(brentq(lambda h: _EXPONENT * np.log(h) - h - wanted, 1.0, 200.0))
 
 
 def with_unknown_noise(log_ratio, degrees: float):
-    """A log likelihood ratio brought to what it means where noise is only known by so many degrees of freedom."""
+    """A log likelihood ratio where the noise is known by so many degrees of freedom only."""
     return degrees / 2 * np.log1p(2 * np.asarray(log_ratio) / degrees)
 
 
@@ -97,13 +96,16 @@ class Evidence:
 
 
 class Monitor:
-    """Takes steps one by one; holds the statistic of each and, once beyond the threshold, the evidence at its height."""
+    """Takes steps one by one; holds the statistic of each and, once beyond the threshold, the evidence at its largest.
+
+    ``alarm``: the first instant beyond the threshold, an index; ``at_alarm`` and ``best``: the evidence then, and at the largest
+    statistic since."""
 
     def __init__(self, geometry: Geometry, noise: Noise, inertia_kgm2, wheels: int, threshold: float, known: Known):
         j = len(geometry.names)
         self.geometry, self.noise, self.threshold, self.known = geometry, noise, threshold, known
         self.variance, self.degrees = noise.variance.copy(), noise.degrees
-        self.taken = 0
+        self.taken, self._last_ns = 0, 0
         self.statistic: list[float] = []
         self.alarm: int | None = None
         self.best: Evidence | None = None
@@ -134,7 +136,11 @@ class Monitor:
             self.forward(steps, i)
             self.measure(steps, i)
             self._judge(i)
-            self.taken = i + 1
+            self.taken, self._last_ns = i + 1, int(steps.tai_ns[i])
+
+    def is_followed_by(self, steps: Steps) -> bool:
+        """Whether ``steps`` begin with those taken so far: the same number of instants up to the last one's time."""
+        return 0 < self.taken <= len(steps.tai_ns) and int(steps.tai_ns[self.taken - 1]) == self._last_ns
 
     def evidence(self, instant: int | None = None) -> Evidence:
         """As it stands after the last instant taken."""
@@ -213,7 +219,7 @@ class Monitor:
             self._learn(v @ steps.turned[i], np.einsum("ij,ik,kj->j", steps.turned[i], S, steps.turned[i]))
 
     def _learn(self, v_B, expected) -> None:
-        """The noise goes on being learned while nothing is wrong: from innovations, beside what was learned before."""
+        """The noise goes on being learned while nothing is wrong, from innovations, added to what was learned before."""
         self.degrees += AXES_IN_A_LEAK / self.noise.alike.max()
         again = self.noise.alike * v_B**2 / expected * self.variance
         self.variance += AXES_IN_A_LEAK * (again - self.variance) / (self.degrees * self.noise.alike)

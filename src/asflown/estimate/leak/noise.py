@@ -9,27 +9,21 @@ import numpy as np
 from ...kit.errors import BadInput
 from ...kit.regression import memory
 from ...kit.timeline import runs
+from ..subject import changes_as_in_a_slew
 from .residual import AXES_IN_A_LEAK, Steps
 
 #: Noise is learned from quiet pieces of so many instants, from the first ones of which so many count together.
 _PIECE, _SHORTEST, _ENOUGH, _FEWEST = 40, 8, 150, 12
-
-
 _TOO_LARGE = 2.5  # times the median piece's variance: noise alone gives it to one piece in a million
-
-
-_SLEWING = 1e-4  # body rates that spread by more in a piece are not those of a hold [rad/s]
-
-
 _SMALLEST_NOISE = 1e-5  # N m s; below it noise-free data would make the filter believe rounding
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Of one instant's momentum about each body axis, in the long run: variance (3,) [(N m s)^2], and what it is worth."""
+    """Of one instant's momentum about each body axis, in the long run: variance (3,) [(N m s)^2], and how well it is known."""
 
     variance: np.ndarray
-    alike: np.ndarray  # (3,), how many successive readings are worth one: part of the variance
+    alike: np.ndarray  # (3,), how many correlated readings count as one: part of the variance
     degrees: float  # of freedom
     until: int  # instants of the record it was learned from
 
@@ -38,18 +32,18 @@ class Noise:
         return np.sqrt(self.variance)
 
 
-def learned_noise(steps: Steps, final: bool) -> Noise | None:
+def learned_noise(steps: Steps, *, final: bool) -> Noise | None:
     """From the first quiet holds: what is left over straight lines through pieces of them.
 
-    A leak is a straight line too, and hardly shows; a piece in which one begins is left out for its size.  None while
-    there are too few instants and more may come.  Raises BadInput where there will be no more."""
+    A leak is a straight line too, and hardly shows; a piece in which one begins is left out, since its variance is large.
+    None while there are too few instants and more may come.  Raises BadInput where there are too few and the record is
+    ``final``."""
     pieces: list[tuple[int, np.ndarray]] = []
     for s in runs(steps.quiet):
         for start in range(s.start, s.stop, _PIECE):
             part = slice(start, min(start + _PIECE, s.stop))
             unfinished = part.stop == len(steps.tai_ns) and part.stop - start < _PIECE and not final
-            slewing = np.ptp(steps.body_rate[part], axis=0).max() > _SLEWING
-            if part.stop - start < _SHORTEST or unfinished or slewing:
+            if part.stop - start < _SHORTEST or unfinished or changes_as_in_a_slew(steps.body_rate[part]):
                 continue
             pieces.append((part.stop, _over_a_line(steps, part)))
             like = _alike_in_size(pieces)

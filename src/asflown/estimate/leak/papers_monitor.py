@@ -1,4 +1,4 @@
-"""The papers' error monitor of excessive thruster commanding (001 section IV): residual momentum beyond a threshold.
+"""The papers' error monitor of excessive thruster commanding (Feldman & Lee 2006, section IV): residual momentum beyond a threshold.
 
 Momentum that orders do not explain, gained within a stated time and larger about some axis than a stated threshold, is a
 leak; which thruster leaks is read off the signs of its three parts.  The papers give no numbers for either.
@@ -23,18 +23,15 @@ _NONE = 1 / 3
 
 @dataclass(frozen=True)
 class ErrorMonitor:
-    """``gained`` (N, 3): residual momentum gained within ``duration_s`` up to each instant, body axes [N m s]."""
+    """``gained_Nms`` (N, 3): residual momentum gained within ``duration_s`` up to each instant, body axes.
+    ``alarm``: the first instant beyond the threshold, an index; ``signs``: of the three parts then, as in '+-0'."""
 
     threshold_Nms: float
     duration_s: float
-    gained: np.ndarray
+    gained_Nms: np.ndarray
     alarm: int | None
     thruster: str | None
     signs: str
-
-    @property
-    def at_alarm(self) -> np.ndarray | None:
-        return None if self.alarm is None else self.gained[self.alarm]
 
 
 def signs_of(torque) -> str:
@@ -51,6 +48,7 @@ def threshold_at_rate(noise: Noise, rate_per_instant: float) -> float:
 
 
 def error_monitor(steps: Steps, geometry: Geometry, threshold_Nms: float, duration_s: float) -> ErrorMonitor:
+    """The monitor over a whole record."""
     t = steps.seconds
     since = np.searchsorted(t, t - duration_s - 1e-9)
     broken = np.flatnonzero(steps.lost)

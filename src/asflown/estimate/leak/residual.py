@@ -1,27 +1,32 @@
 """Residual momentum: what craft and wheels gained beyond what ordered pulses gave, and how well that is known.
 
-    y = R (I w + h_w) - int R sum_j a_j J_j                  in the axes the body had at the first instant (001 section IV)
+    y = R (I w + h_w) - int R sum_j a_j J_j                  in the axes the body had at the first instant (Feldman & Lee 2006, section IV)
 
-It grows with every leak, and with pulses that give more or less than ordered.
+A leak makes it grow, and so do pulses that give more or less than ordered.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ...kit.errors import BadInput
-from ...kit.rotations import turned_by
 from ...kit.timeline import NS
-from ..subject import Samples, Subject, at_limit, samples_of
+from ..firing import check_thrusters
+from ..subject import Subject, at_limit, samples_of
 from .firing import Geometry, firing_of
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
+    from ...kit.doubts import Doubts
 
 #: A leak shows about two axes, each with a noise of its own to know: its size is known by the readings of both.
 AXES_IN_A_LEAK = 2
-GUESS_SHARE = 0.5  # one sigma of a number of pulses that nobody counted
+GUESS_SHARE = 0.5  # one sigma of a number of pulses that is not counted
 
 
 @dataclass(frozen=True)
@@ -38,7 +43,7 @@ class Steps:
     guessed: np.ndarray  # (N, j), relative variance of ``ordered`` where pulses are not counted
     unsure: np.ndarray  # (N, 3, 3), variance of y that firing adds, body axes
     lost: np.ndarray  # (N,), what was ordered or gained since the last instant is not known
-    doubts: tuple[str, ...]
+    doubts: Doubts
 
     @property
     def seconds(self) -> np.ndarray:
@@ -57,7 +62,7 @@ class Steps:
 def steps_of(subject: Subject, geometry: Geometry, thrust_N: float) -> Steps:
     """Residual momentum of a whole record.
 
-    Raises BadInput where inertia, spin inertia or channels are missing, or a channel names a thruster the craft has not."""
+    Raises BadInput where inertia, spin inertia or channels are missing, or a channel names a thruster that the craft does not have."""
     subject.known_inertia()
     if subject.relative:
         raise BadInput(
@@ -65,8 +70,8 @@ def steps_of(subject: Subject, geometry: Geometry, thrust_N: float) -> Steps:
             remedy="Give the craft's file the wheels' spin_inertia.",
         )
     s = samples_of(subject)
-    fired = firing_of(subject.telemetry, geometry, thrust_N)
-    turned = s.attitude[0].inv() * s.attitude if s.attitude is not None else _turned_by_rates(s)
+    check_thrusters(subject)
+    fired, turned = firing_of(subject.telemetry, geometry, thrust_N), s.turned
     kept, given, pulses, unsure, lost = fired.at(s.tai_ns, geometry, thrust_N)
     step, begun = (np.diff(v, axis=0, prepend=v[:1]) for v in (given, pulses))
     middle = _halfway(turned[kept])
@@ -85,7 +90,7 @@ def steps_of(subject: Subject, geometry: Geometry, thrust_N: float) -> Steps:
         guessed=_guessed(begun * ~fired.counted, step, geometry, thrust_N),
         unsure=unsure,
         lost=(np.diff(lost, prepend=lost[:1]) > 0) | limited | np.r_[False, limited[:-1]],
-        doubts=(*s.doubts, *fired.doubts, *of_wheels),
+        doubts=s.doubts + fired.doubts + of_wheels,
     )
 
 
@@ -93,10 +98,6 @@ def _guessed(begun, ordered, geometry: Geometry, thrust_N: float) -> np.ndarray:
     """Relative variance of impulses whose pulses are not counted."""
     impulse = GUESS_SHARE * thrust_N * begun * np.abs(geometry.fall_s - geometry.rise_s)
     return np.divide(impulse, ordered, out=np.zeros_like(ordered), where=ordered > 0) ** 2
-
-
-def _turned_by_rates(s: Samples) -> Rotation:
-    return Rotation.identity(len(s.tai_ns)) if s.rates is None else turned_by(s.seconds, s.rates)
 
 
 def _halfway(turned: Rotation) -> np.ndarray:

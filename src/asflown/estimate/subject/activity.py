@@ -8,20 +8,45 @@ import numpy as np
 from scipy import ndimage
 
 from ...kit.errors import BadInput
+from ...kit.scatter import difference_sigma
 from ...telemetry.channels import AXES
 
 if TYPE_CHECKING:
     from ...craft.model import Craft
-    from ...telemetry.telemetry import Telemetry
+    from ...telemetry.telemetry import Channel, Telemetry
 
-#: A body rate that changes by more than this is that of a slew. [rad/s]
-_SWING_OF_A_SLEW = 2e-4
+#: A body rate that changes by more than both is that of a slew (studies/slew_threshold.py): a rate [rad/s],
+#: and so many sigma of its noise.
+_SWING, _SIGMAS = 5e-4, 20.0
+#: A craft turns where a body rate's median is more than this. [rad/s]
+_TURN = 1e-4
+
+
+def without_spikes(rates: np.ndarray) -> np.ndarray:
+    """Rates (N,) or (N, k) through a running median of five samples."""
+    return ndimage.median_filter(rates, (5,) + (1,) * (rates.ndim - 1), mode="nearest")
+
+
+def changes_as_in_a_slew(rates: np.ndarray, count_size: float = 0.0) -> bool:
+    """Whether any of the body's rates (N, k) [rad/s] changes more than holds let it; how fast it turns does not matter."""
+    if len(rates) < 5:
+        return False
+    noise = max(np.nan_to_num(difference_sigma(rates, 3)), count_size / 12**0.5)
+    return bool(np.ptp(without_spikes(rates), axis=0).max() > max(_SWING, _SIGMAS * noise))
 
 
 def slews(telemetry: Telemetry) -> bool:
-    """Whether the body's rate changes as it does in a slew, never in a hold; single spikes do not count."""
-    rates = [telemetry.channel(f"body_rate_{a}").usable.values for a in AXES if f"body_rate_{a}" in telemetry]
-    return any(len(r) and np.ptp(ndimage.median_filter(r, 5)) > _SWING_OF_A_SLEW for r in rates)
+    """Whether the craft slews: a steady turn, as of a craft that points to the Earth, is none."""
+    return any(changes_as_in_a_slew(c.values[:, None], c.count_size) for c in _rates(telemetry))
+
+
+def turns(telemetry: Telemetry) -> bool:
+    """Whether the craft turns steadily, or for most of the record."""
+    return any(len(c.values) and abs(np.median(c.values)) > _TURN for c in _rates(telemetry))
+
+
+def _rates(telemetry: Telemetry) -> list[Channel]:
+    return [telemetry.channel(f"body_rate_{a}").usable for a in AXES if f"body_rate_{a}" in telemetry]
 
 
 def thrusters_firing(telemetry: Telemetry) -> list[str]:

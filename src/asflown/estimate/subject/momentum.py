@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput
-from ...kit.rotations import rotation
+from ...kit.rotations import rotation, turned_by
 from ...kit.timeline import NS, cadence_ns
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
@@ -47,6 +47,13 @@ class Samples:
     @property
     def momentum(self) -> np.ndarray:
         return self.stored + self.body
+
+    @property
+    def turned(self) -> Rotation:
+        """From body axes to those the body had at the first instant: by attitude, else by rates; no turn where neither is known."""
+        if self.attitude is not None:
+            return self.attitude[0].inv() * self.attitude
+        return Rotation.identity(len(self.tai_ns)) if self.rates is None else turned_by(self.seconds, self.rates)
 
 
 #: Instants that a fit takes at least.

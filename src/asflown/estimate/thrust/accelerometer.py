@@ -1,7 +1,7 @@
 """Velocity from an accelerometer's counts: its bias, what a burn gave, and instants at which the velocity is known well.
 
-Counts are whole.  While nothing fires only the bias moves them, and at the tick from one count to the next the velocity is
-known to much better than a count.
+Counts are integers.  While nothing fires only the bias changes them, and at the tick from one count to the next the velocity is
+known much better than to a count.
 """
 
 from __future__ import annotations
@@ -13,26 +13,30 @@ import numpy as np
 
 from ...kit.errors import BadInput
 from ...kit.timeline import NS
-from ..firing import Chain, Counters, Nuisance
+from ..firing import Chain, Counters, Nuisance, Parameter, Source
 
 if TYPE_CHECKING:
     from ...craft.model import Accelerometer, Craft, Thruster
     from ...telemetry.telemetry import Telemetry
+    from ..firing import Firings, Priors
 
 CHANNEL = "accelerometer_count"
 #: A burn is where its thrusters are on for more than this share of the most they are.
 _BURNING = 0.2
-#: A tick is at best this share of a count, whatever the sampling: an accelerometer has noise of its own.
+#: Sigma of the velocity at a tick is at least this share of a count, however often it is sampled: an accelerometer has noise.
 _TICK = 0.1
-#: A bias not known beforehand. [m/s2]
+#: Sigma of a bias that is not known beforehand. [m/s2]
 _ANY_BIAS = 1.0
+
+
+class NoBurn(BadInput):
+    """No burn is in the record, or the counts do not reach beyond both its ends."""
 
 
 @dataclass(frozen=True)
 class Burn:
     """Change of counts over a burn, its length, and the bias found before it."""
 
-    start_s: float  # from the counters' start
     duration_s: float
     counts: float
     scale_m_s: float
@@ -43,12 +47,28 @@ class Burn:
     squares_s2: np.ndarray  # (j,): of the pulses' lengths, added up
 
     def delta_v_m_s(self, sign: float = -1.0) -> float:
-        """Velocity gained.  001 Appendix D prints + bias x time; a bias that is the output's own drift must come off."""
+        """Velocity gained along the accelerometer's axis.
+
+        Feldman & Lee, Appendix D, add the bias times the time (``sign`` +1); a bias that is the output's own drift must be
+        subtracted (-1)."""
         return self.counts * self.scale_m_s + sign * self.bias_m_s2 * self.duration_s
 
     @property
     def delta_v_sigma_m_s(self) -> float:
         return float(np.hypot(self.scale_m_s / np.sqrt(6), self.bias_sigma_m_s2 * self.duration_s))
+
+    def record(self) -> dict:
+        return {
+            "delta_v_m_s": self.delta_v_m_s(),
+            "delta_v_sigma_m_s": self.delta_v_sigma_m_s,
+            "duration_s": self.duration_s,
+            "bias_m_s2": self.bias_m_s2,
+            "bias_added_delta_v_m_s": self.delta_v_m_s(+1.0),
+        }
+
+
+def mass_not_known() -> BadInput:
+    return BadInput("the craft's mass is not known, and F = M dV / on-time needs it", remedy='Give --mass "3160 kg".')
 
 
 def accelerometer_of(craft: Craft) -> Accelerometer:
@@ -69,7 +89,7 @@ def along_of(craft: Craft, thrusters: tuple[Thruster, ...]) -> np.ndarray:
 def burn_of(tlm: Telemetry, craft: Craft, thrusters: tuple[Thruster, ...], counters: Counters) -> Burn:
     """The burn in a record: its counts from before to after, and the bias before.
 
-    Raises BadInput without counts, without a burn, or where the record does not reach beyond both its ends."""
+    Raises BadInput without counts, NoBurn without a burn or where the record does not reach beyond both its ends."""
     share = along_of(craft, thrusters)
     if CHANNEL not in tlm:
         raise BadInput(
@@ -83,11 +103,11 @@ def burn_of(tlm: Telemetry, craft: Craft, thrusters: tuple[Thruster, ...], count
     duty = (np.diff(counters.on_time_s, axis=0) @ np.abs(share)) / np.diff(t_on)
     burning = np.flatnonzero(duty > _BURNING * duty.max()) if len(duty) and duty.max() > 0 else np.empty(0, int)
     if not len(burning):
-        raise BadInput("no burn is in this record", file=tlm.source or None, remedy="Take the span of a burn.")
+        raise NoBurn("no burn is in this record", file=tlm.source or None, remedy="Take the span of a burn.")
     first, last = burning[0], burning[-1] + 1
     before, after = np.flatnonzero(t <= t_on[first]), np.flatnonzero(t >= t_on[last])
     if len(before) < 3 or not len(after):
-        raise BadInput(
+        raise NoBurn(
             "the accelerometer's counts do not reach from before the burn to after it",
             file=tlm.source or None,
             channel=CHANNEL,
@@ -97,7 +117,17 @@ def burn_of(tlm: Telemetry, craft: Craft, thrusters: tuple[Thruster, ...], count
     bias, sigma = _bias(t[before], c.values[before], scale)
     a, b = before[-1], after[0]
     ends = counters.at(c.tai_ns[[a, b]])
-    return Burn(float(t[a]), float(t[b] - t[a]), float(c.values[b] - c.values[a]), scale, bias, sigma, *(np.diff(x, axis=0)[0] for x in (ends.on_time_s, ends.pulses, ends.squares)))  # fmt: skip
+    on_time_s, pulses, squares = (np.diff(x, axis=0)[0] for x in (ends.on_time_s, ends.pulses, ends.squares))
+    return Burn(
+        duration_s=float(t[b] - t[a]),
+        counts=float(c.values[b] - c.values[a]),
+        scale_m_s=scale,
+        bias_m_s2=bias,
+        bias_sigma_m_s2=sigma,
+        on_time_s=on_time_s,
+        pulses=pulses,
+        squares_s2=squares,
+    )
 
 
 def _bias(t, counts, scale: float) -> tuple[float, float]:
@@ -111,12 +141,13 @@ def _bias(t, counts, scale: float) -> tuple[float, float]:
     return float(slope), float(own / (np.std(at) * np.sqrt(len(at))))
 
 
-def velocity_chain(
-    tlm: Telemetry, craft: Craft, thrusters: tuple[Thruster, ...], counters: Counters, step_s: float, priors, number: int
-) -> Chain:  # fmt: skip
+def velocity_chain(f: Firings, priors: Priors, number: int) -> Chain:
     """The velocity where it is known: at ticks while nothing fires, and at the ends of such spans.
 
-    Raises BadInput as ``burn_of`` does."""
+    Raises BadInput as ``burn_of`` does, and for priors without a mass."""
+    if priors.mass_kg is None:
+        raise mass_not_known()
+    tlm, craft, thrusters, counters = f.telemetry, f.subject.craft.craft, f.thrusters, f.counters
     share = along_of(craft, thrusters)
     burn_of(tlm, craft, thrusters, counters)
     scale = accelerometer_of(craft).scale
@@ -127,11 +158,13 @@ def velocity_chain(
     tick = quiet & (np.abs(np.diff(counts)) == 1)
     edge = np.flatnonzero(np.diff(np.r_[False, quiet, False].astype(int)))  # first and last sample of each quiet span
     middle_ns = (tai_ns[:-1] + tai_ns[1:]) // 2
-    found = [(int(ns), scale * max(a, b), True) for ns, a, b in zip(middle_ns[tick], counts[:-1][tick], counts[1:][tick], strict=True)]  # fmt: skip
+    found = [
+        (int(ns), scale * max(a, b), True)
+        for ns, a, b in zip(middle_ns[tick], counts[:-1][tick], counts[1:][tick], strict=True)
+    ]
     found += [(int(tai_ns[k]), scale * (counts[k] + 0.5), False) for k in np.unique(np.minimum(edge, len(counts) - 1))]
     found.sort()
-    at = np.array([f[0] for f in found])
-    v, ticking = np.array([f[1] for f in found]), np.array([f[2] for f in found])
+    at, v, ticking = (np.array(column) for column in zip(*found, strict=True))
     t = (at - at[0]) / NS
     cadence = float(np.median(np.diff(tai_ns))) / NS
     apart = float(np.median(np.diff(t[ticking]))) if ticking.sum() > 2 else cadence
@@ -144,10 +177,10 @@ def velocity_chain(
         places=share / priors.mass_kg,
         known=counters.at(at),
         used=np.ones(len(v) - 1, bool),
-        step_s=step_s,
+        step_s=f.step_s,
         record=number,
         long_of=counters.lengths.thruster,
         weak=counters.weak(priors.pulse_scatter),
         sample_sigma=np.where(ticking, tick_sigma, scale / np.sqrt(12)),
-        nuisances=(Nuisance(f"accelerometer bias of record {number}", np.diff(t)[:, None], _ANY_BIAS),),
+        nuisances=(Nuisance(Parameter(Source.ACCELEROMETER_BIAS, f"record {number}"), np.diff(t)[:, None], _ANY_BIAS),),
     )

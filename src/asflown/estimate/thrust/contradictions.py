@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,19 +12,16 @@ from ...kit.timeline import runs
 from ..firing import PULSES, Firings, Priors, gained_idle, pulse_Nms, uncounted
 from .printed import balance
 
-if TYPE_CHECKING:
-    from ...craft.model import Craft
-
-#: Share of the momentum gained that one thrust for all leaves unexplained: above it names, places or units are wrong; and to
-#: which share of that an exchange of names must bring it to be told.
+#: Share of the momentum gained that one thrust for all leaves unexplained, above which names, places or units are wrong; and
+#: the factor by which an exchange of names must reduce it to be named.
 _UNEXPLAINED, _BETTER = 0.5, 0.3
-#: Share of all the momentum gained that a span without orders may have.
+#: Share of all the momentum gained that a span without commands may have.
 _IDLE = 0.05
 
 
 def check_names(f: Firings, priors: Priors) -> None:
-    """Raises BadInput where the momentum contradicts the thrusters named, and exchanging two of them, or two and two, would
-    mend it."""
+    """Raises BadInput where the momentum contradicts the thrusters named, and exchanging the names of one or two pairs would
+    remove the contradiction."""
     center = f.subject.craft.craft.center_of_mass or priors.center_m
     Q = moment_matrix([t.position for t in f.thrusters], [t.direction for t in f.thrusters], center)
     known = ~f.at_limit[1:]
@@ -56,19 +52,19 @@ def check_names(f: Firings, priors: Priors) -> None:
                 f"momentum and firings contradict each other ({100 * own:.0f} % unexplained); exchanging {named} leaves {100 * best:.0f} %",
                 file=f.telemetry.source or None,
                 channel=f"on_time_{f.names[pairs[0][0]]}",
-                remedy="Name the on-time columns rightly, or correct the thrusters in the craft file.",
+                remedy="Correct the names of the on-time columns, or the thrusters in the craft file.",
             )
 
 
-def check_counted(f: Firings, craft: Craft) -> None:
-    """Raises BadInput where momentum changes as by many pulses while no on-time rises; without body rates nothing is said."""
+def check_counted(f: Firings) -> None:
+    """Raises BadInput where momentum changes as by many pulses while no on-time rises; without body rates nothing is checked."""
     if f.rates is None:
         return
     steps, body = np.diff(f.in_space, axis=0), f.turned.apply(f.body)
     ordered = (np.diff(f.known.on_time_s, axis=0) > 0).any(axis=1) | f.broken
     for s in runs(~ordered):
         gained = gained_idle(f.in_space[s.start : s.stop + 1], body[s.start : s.stop + 1])
-        pulses = gained / pulse_Nms(craft, f.thrusters, f.step_s, f.telemetry.date_ns)
+        pulses = gained / pulse_Nms(f.subject.craft.craft, f.thrusters, f.step_s, f.telemetry.date_ns)
         if pulses > PULSES and gained > _IDLE * np.linalg.norm(steps, axis=1).sum():
             a, b = (f.telemetry.describe_time(int(f.tai_ns[k])) for k in (s.start, s.stop))
             raise uncounted(gained, pulses, f"from {a} to {b}", f.telemetry.source)

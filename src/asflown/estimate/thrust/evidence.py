@@ -1,4 +1,4 @@
-"""What the results of all methods share: on-times, pulses and R, and what a record showed."""
+"""What the results of several methods share: on-times, pulses and R, and what a record showed."""
 
 from __future__ import annotations
 
@@ -6,41 +6,35 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...dynamics.pulses import Valve, expected_effective
+from ...dynamics.pulses import VARIANTS, Valve, expected_effective
 from ...kit.timeline import utc_label
-from ...telemetry.telemetry import Telemetry, file_name
+from ...telemetry.telemetry import file_name
 from .result import EventSeen
 
 if TYPE_CHECKING:
-    from ...craft.model import Craft
     from ..firing import Counters, Firings
 
 
 def pulse_ratios(counters: list[Counters], which, step_s: float, valve: Valve) -> dict[str, float]:
     """R of all pulses of the thrusters ``which``, by both formulas."""
-    on, n = (np.concatenate([np.diff(v[:, which], axis=0) for v in (getattr(c, key) for c in counters)])
-             for key in ("on_time_s", "pulses"))  # fmt: skip
-    return {v: float(expected_effective(on, n, step_s, valve, v).sum() / on.sum()) for v in ("printed", "corrected")}
+    on = np.concatenate([np.diff(c.on_time_s[:, which], axis=0) for c in counters])
+    n = np.concatenate([np.diff(c.pulses[:, which], axis=0) for c in counters])
+    return {v: float(expected_effective(on, n, step_s, valve, v).sum() / on.sum()) for v in VARIANTS}
 
 
-def common_of(records: list[Firings], craft: Craft, first: Telemetry, valve: Valve) -> dict:
-    names = records[0].names
+def common_of(records: list[Firings], valve: Valve) -> dict:
+    """Fields of the result that the joint and the printed method share."""
+    first, names = records[0].subject, records[0].names
     fired = np.flatnonzero(np.sum([f.total_on_time_s for f in records], axis=0) > 0)
     return {
-        "craft": craft.name,
-        "epoch": first.epoch_label,
+        "craft": first.craft.craft.name,
+        "epoch": first.telemetry.epoch_label,
         "names": names,
         "pulse_ratio": pulse_ratios([f.counters for f in records], fired, records[0].step_s, valve),
         "on_time_s": {n: float(sum(f.total_on_time_s[k] for f in records)) for k, n in enumerate(names)},
         "pulses": {n: float(sum(f.total_pulses[k] for f in records)) for k, n in enumerate(names)},
         "pulses_counted": all(f.counters.counted for f in records),
     }
-
-
-def doubts_of(records: list[Firings]) -> list[str]:
-    if len(records) == 1:
-        return list(records[0].doubts)
-    return [f"{f.telemetry.source or f'record {k}'}: {d}" for k, f in enumerate(records, 1) for d in f.doubts]
 
 
 def event_seen(f: Firings, left, number: int) -> EventSeen:
@@ -58,6 +52,6 @@ def event_seen(f: Firings, left, number: int) -> EventSeen:
         counter_time_s=tlm.seconds(f.counters.tai_ns),
         on_time_s=f.counters.on_time_s,
         time_s=tlm.seconds(f.tai_ns[1:]),
-        gained=np.cumsum(steps, axis=0),
-        left=None if left is None else np.cumsum(left, axis=0),
+        gained_Nms=np.cumsum(steps, axis=0),
+        left_Nms=None if left is None else np.cumsum(left, axis=0),
     )

@@ -1,7 +1,7 @@
-"""Thrust as flown, from wheel biasing, run-downs under thruster control and burns (001 section V, Appendix D).
+"""Thrust as flown, from wheel biasing, run-downs under thruster control and burns (Feldman & Lee, section V and Appendix D).
 
 ``joint`` (default): one model of all records: momentum, and velocity where an accelerometer counts, with the corrected
-formula of the pulse (``thrust_fit``).  ``printed``: 001 eqs 14-23 (``thrust_printed``), divided by R.  ``accelerometer``:
+formula of the pulse (``fit``).  ``printed``: eqs 14-23 (``printed``), divided by R.  ``accelerometer``:
 F = M dV / sum of on-times, divided by R (Appendix D).
 """
 
@@ -10,13 +10,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ...dynamics.pulses import VARIANTS
-from ...kit.errors import BadInput, some_of
-from ...kit.timeline import NS, utc_label
+from ...kit.doubts import Doubts
+from ...kit.errors import BadInput, check_choice
+from ...kit.result import recorded
 from ...telemetry.telemetry import Telemetry
-from ..firing import Priors, priors_for
+from ..firing import priors_for
+from ..subject import subject_of
+from .doubts import doubts_of_dates
 from .joint import joint
 from .papers import accelerometer_result, printed_result
 
@@ -24,18 +25,13 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ...craft.model import Craft
+    from ..firing import Priors
     from .result import ThrustResult
 
 METHODS = ("joint", "printed", "accelerometer")
 
-#: Records this far apart may have different thrusts. [days]
-_APART_DAYS = 60.0
-#: A prediction older than this is doubted [days]; a newer one is taken to be good to this share, assumed.
-_STALE_DAYS, _PREDICTED_SHARE = 200.0, 0.05
-#: Two branches' thrusts are not further apart than this share; assumed.
-_NO_BRANCH = 0.3
 
-
+@recorded
 def thrust(
     telemetry: Telemetry | Sequence[Telemetry],
     craft: Craft,
@@ -44,47 +40,58 @@ def thrust(
     variant: str = "corrected",
     priors: Priors | None = None,
 ) -> ThrustResult:
-    """Steady thrust of every thruster, fall time and centre of mass, of one record or several together.
+    """Steady thrust of every thruster, fall time of the valves and centre of mass, from one record or several together.
 
-    ``variant``: which formula's R divides a thrust of the printed and accelerometer methods: ``corrected``, or ``printed``, which
-    gives 1.395 for 125 ms in place of 1.359; the joint method has the corrected one only.
+    The joint method fits momentum about the centre of mass, and velocity where an accelerometer counts, step by step between
+    samples:
 
-    Raises BadInput where no thruster fires, names or counters do not fit the craft, or channels are missing."""
-    if method not in METHODS:
-        raise BadInput(f"method {method!r} is not known", remedy=f"Choose one of: {some_of(METHODS)}.")
-    if variant not in VARIANTS or (method == "joint" and variant != "corrected"):
+        d(R (I w + h_w)) = R sum_k (r_k - c) x d_k F_k T_k + noise,   T_k = on-time + pulses (fall - rise) + ...
+
+    with places r_k, directions d_k and effective times T_k of the pulses (``dynamics.pulses``).
+
+    Parameters
+    ----------
+    telemetry : Telemetry or sequence of Telemetry
+        On-times of every thruster, pulse counts where there are any, wheel rates and body rates; accelerometer counts for a
+        burn.  All records are given one thrust.
+    craft : Craft
+        Places and directions of the thrusters, wheels with spin inertia, inertia.
+    method : {'joint', 'printed', 'accelerometer'}
+        'printed' is the least squares of Feldman & Lee, eqs 14-23; 'accelerometer' F = M dV / on-time of one burn (their
+        Appendix D).  Both divide by the ratio R of these pulses.
+    variant : {'corrected', 'printed'}
+        Formula of R for the printed and accelerometer methods: 'printed' gives 1.395 for a pulse of 125 ms, 'corrected' 1.359.
+        The joint method has the corrected one only.
+    priors : Priors, optional
+        What is known beforehand, as ``priors_for`` gives it with what the user says instead: fall time [s], centre of mass [m],
+        scatter, mass [kg].  By default those of the craft.
+
+    Returns
+    -------
+    ThrustResult
+        Thrusts [N], along each thruster's direction of force on the craft; fall time [s]; centre of mass (3,) [m] in the axes of
+        the thrusters' positions.
+
+    Raises
+    ------
+    BadInput
+        Where no thruster fires, names or counters do not fit the craft, or channels are missing.
+    """
+    check_choice(method, METHODS, "method")
+    check_choice(variant, VARIANTS, "variant")
+    if method == "joint" and variant != "corrected":
         raise BadInput(
-            f"variant {variant!r} is not one of the {method} method",
+            f"the joint method has no variant {variant!r}",
             remedy="The joint method is always corrected; printed and accelerometer take --variant corrected or printed.",
         )
     records = [telemetry] if isinstance(telemetry, Telemetry) else list(telemetry)
     known = priors or priors_for(craft)
-    done = {"joint": joint, "printed": printed_result, "accelerometer": accelerometer_result}[method](
-        records, craft, variant, known
-    )
+    subjects = [subject_of(t, craft) for t in records]
+    if method == "joint":
+        done = joint(subjects, known)
+    else:
+        done = (printed_result if method == "printed" else accelerometer_result)(subjects, variant, known)
     dated = [t for t in records if t.dated]
-    days = [t.epoch_ns / NS / 86_400 for t in dated]
-    doubts = list(done.doubts)
-    if days and max(days) - min(days) > _APART_DAYS:
-        doubts.append(
-            f"the records lie {max(days) - min(days):.0f} days apart and are given one thrust: it falls as propellant is used"
-        )
-    predicted = None
-    if dated and craft.thrust_history:
-        predicted = craft.thrust_at(dated[0].epoch_ns)
-        last = max(h.date for h in craft.thrust_history)
-        if dated[0].epoch_ns - last > _STALE_DAYS * 86_400 * NS:
-            doubts.append(
-                f"the predicted thrust is that of {utc_label(last)[:10]}, the last one known: it has fallen since"
-            )
-        elif done.mean_sigma_N is not None:
-            off, expected = done.mean_thrust_N - predicted, np.hypot(done.mean_sigma_N, _PREDICTED_SHARE * predicted)
-            if abs(off) > 2 * expected:
-                why = "the other branch, with a thrust of its own and the same places, would look so"
-                if abs(off) > _NO_BRANCH * predicted:
-                    why = "neither blow-down nor the other branch explains so much"
-                doubts.append(
-                    f"the mean is {100 * off / predicted:+.0f} % from the {predicted:.3g} N predicted, which are taken to be known to "
-                    f"{100 * _PREDICTED_SHARE:.0f} %: {why}"
-                )
-    return replace(done, predicted_N=predicted, doubts=tuple(dict.fromkeys(doubts)))
+    predicted = craft.thrust_at(dated[0].epoch_ns) if dated and craft.thrust_history else None
+    found = doubts_of_dates(records, craft, done.mean_thrust_N, done.mean_thrust_sigma_N)
+    return replace(done, predicted_thrust_N=predicted, doubts=done.doubts + Doubts(found))

@@ -1,8 +1,8 @@
-"""001 section V as printed: thrust by least squares on on-times alone (eqs 14-23), to be divided by R of the pulses.
+"""Feldman & Lee, section V, as printed: thrust by least squares on on-times alone (eqs 14-23), to be divided by R of the pulses.
 
     I dw + dH + int w x (I w + H) dt = Q diag(F) on-time                                        eqs 15, 17
 
-Z thrusters from the X and Y rows (eqs 18, 19), each for itself.  Y thrusters from the Z row: those of a pair have one
+Z thrusters from the X and Y rows (eqs 18, 19), each by itself.  Y thrusters from the Z row: those of a pair have one
 on-time, so their columns are proportional whatever the centre of mass and the rank is 2 of 4; eq 20 says it is because e_X is
 small.  Each pair has one thrust then (eq 21; P_YY, P_ZZ are one), all four have one (eq 22), and all eight (eq 23, whose Y
 and Z rows are printed corruptly; all of Q is taken).  Pulses are rectangles here: R makes up for it.
@@ -17,6 +17,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from ...dynamics.pulses import moment_matrix
+from ...kit.doubts import Doubt, Doubts, Kind, Severity
 
 if TYPE_CHECKING:
     from ..firing import Firings
@@ -25,15 +26,30 @@ if TYPE_CHECKING:
 _NONE = 1e-6
 
 
+Z_NOT_SEPARATED = Kind(
+    "thrust.z-thrusters-not-separated", Severity.CAUTION,
+    "the X and Y rows do not separate {thrusters} (rank {rank} of {count})", "Use --method joint.",
+)  # fmt: skip
+PAIRS_NOT_SEPARATED = Kind(
+    "thrust.pairs-not-separated", Severity.CAUTION, "the Z row does not separate the pairs that turn the craft about Z",
+    "Use --method joint.",
+)  # fmt: skip
+ONE_THRUST_A_PAIR = Kind(
+    "thrust.one-thrust-a-pair", Severity.NOTE,
+    "thrusters of a pair about Z have the same on-times, so their columns are proportional and the rank is {rank} of {count}: a "
+    "pair is given one thrust",
+)  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Printed:
-    """Thrusts before R, by thruster or pair."""
+    """Thrusts before R [N], by thruster and by pair; None for what is not separated."""
 
     single: dict[str, float]
-    pairs: dict[str, float]
+    pairs: dict[tuple[str, ...], float]
     mean_others: float | None  # eq 22
     mean: float  # eq 23
-    doubts: tuple[str, ...]
+    doubts: Doubts
 
 
 def balance(f: Firings) -> np.ndarray:
@@ -44,7 +60,7 @@ def balance(f: Firings) -> np.ndarray:
 
 
 def printed_thrust(records: list[Firings], center_m) -> Printed:
-    """All records stacked, one set of thrusts; centre of mass (3,) [m] as given, the papers say no value."""
+    """All records stacked, one set of thrusts; centre of mass (3,) [m] as given, the paper gives none."""
     thrusters = records[0].thrusters
     Q = moment_matrix([t.position for t in thrusters], [t.direction for t in thrusters], center_m)
     V = np.concatenate([balance(f)[~f.at_limit[1:]] for f in records])
@@ -53,35 +69,31 @@ def printed_thrust(records: list[Firings], center_m) -> Printed:
     names = [t.name for t in thrusters]
     fired = on[-1] > 0 if len(records) == 1 else (on > 0).any(axis=0)
     along_z = np.array([abs(t.direction[2]) > 0.5 for t in thrusters])
-    doubts, single = [], {}
+    doubts: list[Doubt] = []
     z = np.flatnonzero(along_z & fired)
+    single: dict[str, float] = {}
     if len(z):
         columns = U[:, :2, z].reshape(-1, len(z))
         solved = _solved(columns, V[:, :2].ravel())
         if solved is None:
-            doubts.append(
-                f"{', '.join(names[k] for k in z)} are not told apart by X and Y rows (rank {_rank(columns)} of {len(z)})"
-            )
+            doubts.append(Z_NOT_SEPARATED(thrusters=[names[k] for k in z], rank=_rank(columns), count=len(z)))
         else:
             single = {names[k]: float(v) for k, v in zip(z, solved, strict=True)}
     y = np.flatnonzero(~along_z & fired)
-    pairs, mean_others = {}, None
+    pairs: dict[tuple[str, ...], float] = {}
+    mean_others = None
     if len(y):
-        rank = _rank(U[:, 2, y])
         groups = _alike(on[:, y], y)
-        columns = np.stack([U[:, 2, g].sum(axis=1) for g in groups], axis=1)
-        solved = _solved(columns, V[:, 2])
+        solved = _solved(np.stack([U[:, 2, g].sum(axis=1) for g in groups], axis=1), V[:, 2])
         if solved is None:
-            doubts.append("the pairs that turn about Z are not told apart")
+            doubts.append(PAIRS_NOT_SEPARATED())
         else:
-            pairs = {"+".join(names[k] for k in g): float(v) for g, v in zip(groups, solved, strict=True)}
+            pairs = {tuple(names[k] for k in g): float(v) for g, v in zip(groups, solved, strict=True)}
         mean_others = float(_one(U[:, 2, y].sum(axis=1), V[:, 2]))
+        rank = _rank(U[:, 2, y])
         if rank < len(y):
-            doubts.append(
-                f"thrusters of a pair that turns about Z have one on-time, their columns are proportional and the rank is {rank} of "
-                f"{len(y)}: a pair has one thrust"
-            )
-    return Printed(single, pairs, mean_others, float(_one(U.sum(axis=2).ravel(), V.ravel())), tuple(doubts))
+            doubts.append(ONE_THRUST_A_PAIR(rank=rank, count=len(y)))
+    return Printed(single, pairs, mean_others, float(_one(U.sum(axis=2).ravel(), V.ravel())), Doubts(doubts))
 
 
 def _one(u, v) -> float:

@@ -1,21 +1,50 @@
-"""Two reconstructions of one torque, side by side: peaks, ratio, lag, and what their signs betray."""
+"""Two reconstructions of one torque, side by side: peaks, ratio and lag."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
+from ...kit.digits import scaled_unit
+from ...kit.errors import check_choice
+from ...kit.result import Estimate
+from ...kit.schema import Annotated, Doc, Number, TypedDict
+from ...kit.table import Table
 from ...telemetry.channels import AXES
 from .result import TorqueResult, find_peaks
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """``b`` set against ``a`` on one axis.
+class PeakPairRecord(TypedDict):
+    """One peak in both."""
+
+    time_s: Number
+    a_torque_Nm: Number
+    b_torque_Nm: Number
+    ratio: Annotated[Number, Doc("b's peak over a's")]
+    peak_lag_s: Number
+
+
+class TorqueComparisonRecord(TypedDict):
+    """An element of ``comparison`` in the JSON of `asflown torque --compare`."""
+
+    axis: str
+    a: Annotated[str, Doc("method and variant")]
+    b: str
+    lag_s: Annotated[Number, Doc("shift of b of largest correlation; positive: b is later")]
+    correlation: Number
+    peaks: list[PeakPairRecord]
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class TorqueComparison(Estimate):
+    """``b`` set against ``a`` on one axis; ``a`` and ``b`` are called by method and variant.
 
     ``lag_s``: the shift of b that maximises the correlation (positive: b is later);
     ``peak_lags_s``: times of b's peaks less a's; ``ratios``: b's peak over a's."""
+
+    RECORD: ClassVar[type] = TorqueComparisonRecord
 
     axis: str
     a: str
@@ -31,41 +60,77 @@ class Comparison:
     def ratios(self) -> tuple[float, ...]:
         return tuple(b / a for a, b in zip(self.a_peaks_Nm, self.b_peaks_Nm, strict=True))
 
-    def __str__(self) -> str:
-        lines = [
-            f"  {self.b} against {self.a}, axis {self.axis}: lag {self.lag_s:+.1f} s at correlation {self.correlation:.3f}"
-        ]
-        for t, x, y, r, p in zip(
+    def _pairs(self):
+        return zip(
             self.peak_times_s, self.a_peaks_Nm, self.b_peaks_Nm, self.ratios, self.peak_lags_s, strict=True
-        ):
-            lines.append(
-                f"      at {t:6.0f} s {x:+11.4g} and {y:+11.4g} N m   ratio {r:5.2f}   {p:+4.0f} s between peaks"
-            )
-        return "\n".join(lines)
+        )  # fmt: skip
 
-    def record(self) -> dict:
+    def _tables(self) -> tuple[Table, ...]:
+        factor, unit = scaled_unit(max(map(abs, self.a_peaks_Nm), default=0.0), "N m")
+        rows = tuple(
+            (f"{t:.0f}", f"{factor * x:+.4g}", f"{factor * y:+.4g}", f"{r:.2f}", f"{p:+.0f}") for t, x, y, r, p in self._pairs()
+        )  # fmt: skip
+        head = ("peak at [s]", f"{self.a} [{unit}]", f"{self.b} [{unit}]", "ratio", "later by [s]")
+        title = f"{self.b} against {self.a}, axis {self.axis}: lag {self.lag_s:+.1f} s at correlation {self.correlation:.3f}"
+        return (Table(title, rows, head if rows else ()),)
+
+    def _record(self) -> dict:
         return {
             "axis": self.axis, "a": self.a, "b": self.b, "lag_s": self.lag_s, "correlation": self.correlation,
             "peaks": [
-                {"time_s": t, "a_torque_Nm": x, "b_torque_Nm": y, "ratio": r, "peak_lag_s": p}
-                for t, x, y, r, p in zip(self.peak_times_s, self.a_peaks_Nm, self.b_peaks_Nm, self.ratios,
-                                         self.peak_lags_s, strict=True)
+                {"time_s": t, "a_torque_Nm": x, "b_torque_Nm": y, "ratio": r, "peak_lag_s": p} for t, x, y, r, p in self._pairs()
             ],
         }  # fmt: skip
 
 
-def compare_torques(a: TorqueResult, b: TorqueResult, axis: str, peaks_at: list[float] | None = None) -> Comparison:
-    """Peaks, ratio and lag of ``b`` against ``a``.  ``peaks_at``: where to look, else a's own peaks."""
+def torque_comparison(
+    a: TorqueResult, b: TorqueResult, axis: str, *, peaks_at: list[float] | None = None
+) -> TorqueComparison:
+    """Peaks, ratio and lag of one torque against another.
+
+    Parameters
+    ----------
+    a, b : TorqueResult
+        Of the same epoch; ``b`` is set against ``a``.
+    axis : {'x', 'y', 'z'}
+        The body axis compared.
+    peaks_at : list of float, optional
+        Times [s from the epoch] to look for peaks at; a's own peaks unless given.
+
+    Returns
+    -------
+    TorqueComparison
+        With the doubts of both.
+
+    Raises
+    ------
+    BadInput
+        For an unknown axis.
+    """
+    check_choice(axis, AXES, "axis")
     j = AXES.index(axis)
     times = [p.time_s for p in find_peaks(a, j)] if peaks_at is None else list(peaks_at)
     reach = _reach(times)
     x = [peak_near(a, j, t, reach) for t in times]
     y = [peak_near(b, j, t, reach) for t in times]
     lag, correlation = best_lag(a.time_s, a.torque_Nm[:, j], b.time_s, b.torque_Nm[:, j])
-    return Comparison(
-        axis, f"{a.method} {a.variant}", f"{b.method} {b.variant}", lag, correlation, tuple(times),
-        tuple(v for _, v in x), tuple(v for _, v in y), tuple(tb - ta for (ta, _), (tb, _) in zip(x, y, strict=True)),
-    )  # fmt: skip
+    names = [f"{r.method} {r.variant}" for r in (a, b)]
+    return TorqueComparison(
+        craft=a.craft,
+        epoch=a.epoch,
+        method=f"{names[1]} against {names[0]}",
+        inputs=tuple(dict.fromkeys((*a.inputs, *b.inputs))),
+        doubts=a.doubts.passed_on_by(names[0]) + b.doubts.passed_on_by(names[1]),
+        axis=axis,
+        a=names[0],
+        b=names[1],
+        lag_s=lag,
+        correlation=correlation,
+        peak_times_s=tuple(times),
+        a_peaks_Nm=tuple(v for _, v in x),
+        b_peaks_Nm=tuple(v for _, v in y),
+        peak_lags_s=tuple(tb - ta for (ta, _), (tb, _) in zip(x, y, strict=True)),
+    )
 
 
 def _reach(times) -> float:

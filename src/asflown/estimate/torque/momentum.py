@@ -1,7 +1,7 @@
-"""Disturbance torque from the momentum of wheels and body (000 section III, eqs 1-9; 004 eqs 12-16).
+"""Disturbance torque from the momentum of wheels and body (cover paper, section III, eqs 1-9; plume paper, eqs 12-16).
 
-``printed`` is the paper's way: wheel momentum alone, splined to 1 s, smoothed by local regression
-over 8 % of the record, differenced forward.  Its two faults hide each other: leaving out I w (eq 6)
+``printed`` is the papers' method: wheel momentum alone, splined to 1 s, smoothed by local regression
+over 8 % of the record, differenced forward.  Its two errors offset each other: leaving out I w (eq 6)
 enlarges pulses by 6-14 %, the smoothing takes about as much off.  The answer is late by 2 s, and
 pulses of 5-10 s come out wrong by tens of percent.
 
@@ -11,13 +11,18 @@ from local cubics of each channel at its own sample times: no spline, no differe
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 
 from ...dynamics.momentum import wheel_momentum
-from ...kit.errors import BadInput
+from ...kit.doubts import Doubt, Doubts, Kind, Severity
+from ...kit.errors import BadInput, check_choice
 from ...kit.regression import local_polynomial, loess
 from ...kit.timeline import NS, runs
 from ...telemetry.channels import AXES
+from ..fused import excursions
 from ..subject import (
     Grid,
     Subject,
@@ -29,13 +34,48 @@ from ..subject import (
     grid_for,
     splined,
 )
+from .answer import VARIANTS, Answer, Method, check_window
 
 #: Half-width of the local cubics, chosen by studies/momentum_window.py; one for all channels, so that what
 #: wheels and body pass between them cancels. [s]
 HALF_WIDTH_S = 18.0
 
-#: The paper's smoothing span, as a fraction of the 1-s samples (000 section III-A).
+#: The paper's smoothing span, as a fraction of the 1-s samples (cover paper, section III-A).
 PRINTED_SPAN = 0.08
+
+PRINTED = Kind(
+    "torque.printed-momentum", Severity.CAUTION,
+    "the printed method leaves out I w and smooths over 8 % of the record ({span_s:.0f} s here): pulses of 15-30 s come out "
+    "2-10 % high and 2 s late, narrower ones wrong by tens of percent",
+    "Use --variant corrected, or --method fused.",
+)  # fmt: skip
+FEW_IN_WINDOW = Kind(
+    "torque.few-samples-in-window", Severity.CAUTION,
+    "a window of {span_s:.0f} s holds fewer than five samples of {cadence_s:g} s: almost nothing is smoothed",
+    "Take a longer record.",
+)  # fmt: skip
+NO_BODY_RATES = Kind(
+    "torque.no-body-rates", Severity.CAUTION,
+    "there are no body rates: the body's own momentum and w x H are left out, so pulses of 15-30 s come out 6-14 % high",
+    "Add body_rate_x, _y and _z.",
+)  # fmt: skip
+INERTIA_UNKNOWN = Kind(
+    "torque.inertia-unknown", Severity.CAUTION,
+    "the craft's inertia is not known: the body's own momentum is left out, and only w x h is kept", "Give --inertia.",
+)  # fmt: skip
+PEAKS_ROUNDED = Kind(
+    "torque.peaks-rounded", Severity.CAUTION,
+    "smoothing over ±{half_width_s:.0f} s rounds sharp peaks: they may be up to {low_percent:.0f} % low, with ±{noise_percent:.0f} % "
+    "of noise (2 sigma); the band holds the noise only, and single peaks can be further off than the printed method's, whose two "
+    "errors offset each other",
+    "Use --method fused, or a shorter --window at the price of noise.",
+)  # fmt: skip
+PEAKS_NOT_RESOLVED = Kind(
+    "torque.peaks-not-resolved", Severity.CAUTION,
+    "some excursions are no wider than the smoothing window of ±{half_width_s:.0f} s: their height and shape are not resolved, "
+    "only their impulse is",
+    "Use --method fused, or a shorter --window at the price of noise.",
+)  # fmt: skip
 
 
 def printed_span(samples: int, share: float = PRINTED_SPAN) -> int:
@@ -43,29 +83,79 @@ def printed_span(samples: int, share: float = PRINTED_SPAN) -> int:
     return 2 * (int(np.ceil(share * samples)) // 2) + 1
 
 
-def printed(subject: Subject):
-    """The paper's way. Returns grid, torque (M, 3), None (no sigma), momentum (M, 3), settings, doubts."""
-    grid, momentum = splined_momentum(subject)
-    smooth, span = smoothed_as_printed(momentum)
-    torque = np.diff(smooth, axis=0)  # forward difference over 1 s, given at the earlier instant
-    grid = Grid(grid.start_ns, 1.0, grid.count - 1)
-    doubts = [
-        f"printed method: I w is left out and the window is 8 % of the record ({span} s here): pulses of 15-30 s come out "
-        "2-10 % high and 2 s late, narrower ones wrong by tens of percent"
-    ]
-    doubts += gap_doubts(
-        subject.telemetry, grid, {g: c.name for c, _ in subject.wheels() for g in gaps_on_grid(c, grid)}
-    )
-    coarsest = max(c.cadence_ns for c, _ in subject.wheels()) / NS
-    if span < 5 * coarsest:
-        doubts.append(
-            f"a window of {span} s holds fewer than five samples of {coarsest:g} s: almost nothing is smoothed"
+@dataclass(frozen=True, kw_only=True)
+class Momentum(Method):
+    """Slopes of the total momentum; ``window_s``: full width of the local cubics, in place of the studied one."""
+
+    name: ClassVar[str] = "momentum"
+    window_s: float | None = None
+    variant: str = "corrected"
+
+    def __post_init__(self):
+        check_choice(self.variant, VARIANTS, "variant")
+        check_window(self.window_s, self.variant)
+
+    def estimate(self, subject: Subject, axes: tuple[int, ...]) -> Answer:
+        return self._printed(subject) if self.variant == "printed" else self._corrected(subject, axes)
+
+    def _printed(self, subject: Subject) -> Answer:
+        grid, momentum = splined_momentum(subject)
+        smooth, span = smoothed_as_printed(momentum)
+        torque = np.diff(smooth, axis=0)  # forward difference over 1 s, given at the earlier instant
+        grid = Grid(grid.start_ns, 1.0, grid.count - 1)
+        silent = {g: c.name for c, _ in subject.wheels() for g in gaps_on_grid(c, grid)}
+        coarsest = max(c.cadence_ns for c, _ in subject.wheels()) / NS
+        few = FEW_IN_WINDOW(span_s=span, cadence_s=coarsest) if span < 5 * coarsest else None
+        doubts = Doubts([PRINTED(span_s=span), *gap_doubts(subject.telemetry, grid, silent), few])
+        return Answer(
+            by=self,
+            grid=grid,
+            torque_Nm=torque,
+            momentum_Nms=smooth[:-1],
+            settings={"span_samples": span},
+            doubts=doubts,
         )
-    return grid, torque, None, smooth[:-1], {"span_samples": span}, doubts
+
+    def _corrected(self, subject: Subject, axes: tuple[int, ...]) -> Answer:
+        """The actuators' momentum comes from wheel rates, from wheel_momentum, or, where only their torque is telemetered,
+        from control_torque."""
+        tlm, I_B = subject.telemetry, subject.inertia_kgm2
+        stored, pushed, doubts = actuators(subject)
+        rates = [tlm.channel(f"body_rate_{a}") for a in AXES] if tlm.has_axes("body_rate") else []
+        if not rates:
+            doubts = [*doubts, NO_BODY_RATES()]
+        elif I_B is None:
+            doubts = [*doubts, INERTIA_UNKNOWN()]
+        everything = [*(c for c, _ in stored), *rates, *pushed]
+        grid = grid_for(everything)
+        # the coarsest channel decides how narrow the common window can be: five samples
+        coarsest = max(c.usable.cadence_ns for c in everything) / NS
+        width = max(HALF_WIDTH_S if self.window_s is None else self.window_s / 2, 2.5 * coarsest)
+        directions = [d for _, d in stored] + [None if I_B is None else I_B[:, j] for j in range(len(rates))]
+        fits = [fit_on_grid(c, grid, degree=3, half_width_s=width) for c in everything]
+        momentum, torque, variance = np.zeros((3, grid.count, 3))
+        for f, direction in zip(fits, directions, strict=False):  # those of pushed channels come last
+            if direction is not None:
+                momentum += np.outer(f.fit.value, direction)
+                torque += np.outer(f.fit.slope, direction)
+                variance += np.outer(f.variance([0, 1, 0]), direction**2)
+        if rates:
+            body = fits[len(stored) : len(stored) + 3]
+            torque += np.cross(np.stack([f.fit.value for f in body], axis=1), momentum)
+        for j, f in enumerate(fits[len(directions) :]):
+            torque[:, j] -= f.fit.value
+            variance[:, j] += f.variance([1, 0, 0])
+        silent = {g: c.name for f, c in zip(fits, everything, strict=True) for g in f.gaps}
+        sigma = np.sqrt(variance)
+        doubts = Doubts([*doubts, *gap_doubts(tlm, grid, silent), _rounding(grid.step_s, torque, sigma, width, axes)])
+        return Answer(
+            by=self, grid=grid, torque_Nm=torque, sigma_Nm=sigma, momentum_Nms=momentum,
+            settings={"half_width_s": width, "degree": 3}, doubts=doubts,
+        )  # fmt: skip
 
 
 def splined_momentum(subject: Subject) -> tuple[Grid, np.ndarray]:
-    """Wheel momentum in body axes, every rate splined to 1 s (000 eq 7 and section III-A)."""
+    """Wheel momentum in body axes, every rate splined to 1 s (cover paper, eq 7 and section III-A)."""
     wheels = subject.wheels()
     grid = grid_for([c for c, _ in wheels], step_s=1.0)
     rates = np.stack([splined(c, grid) for c, _ in wheels], axis=1)
@@ -92,48 +182,24 @@ def smoothed_as_printed(values: np.ndarray, share: float = PRINTED_SPAN) -> tupl
     return out, span
 
 
-def corrected(subject: Subject, window_s: float | None = None):
-    """Local cubic slopes of every channel, body momentum and transport term included.
+#: A corner rounded twice is rounded over sqrt(2) times the width: the first pass took this many times
+#: what the second takes.
+_FIRST_PASS = 1 / (np.sqrt(2) - 1)
 
-    The actuators' momentum comes from wheel rates, from wheel_momentum, or, where only their torque
-    is telemetered, from control_torque.  Returns as ``printed``, with sigma (M, 3)."""
-    tlm, I_B = subject.telemetry, subject.inertia_kgm2
-    doubts: list[str] = []
-    has_rates = tlm.has_axes("body_rate")
-    stored, pushed, spin_doubt = actuators(subject)
-    doubts += spin_doubt
-    rates = [tlm.channel(f"body_rate_{a}") for a in AXES] if has_rates else []
-    if not has_rates:
-        doubts.append(
-            "no body rates: the body's own momentum and w x H are left out, so pulses of 15-30 s come out 6-14 % high"
-        )
-    elif I_B is None:
-        doubts.append("the craft's inertia is not known: the body's own momentum is left out, only w x h is kept")
-    grid = grid_for([c for c, _ in stored] + rates + pushed)
-    # the coarsest channel decides how narrow the common window can be: five samples
-    coarsest = max(c.usable.cadence_ns for c in [c for c, _ in stored] + rates + pushed) / NS
-    width = max(HALF_WIDTH_S if window_s is None else window_s / 2, 2.5 * coarsest)
-    wheels = [(fit_on_grid(c, grid, degree=3, half_width_s=width), c, direction) for c, direction in stored]
-    body = [(fit_on_grid(c, grid, degree=3, half_width_s=width), c, None if I_B is None else I_B[:, j])
-            for j, c in enumerate(rates)]  # fmt: skip
-    momentum, torque, variance = np.zeros((3, grid.count, 3))
-    silent: dict[tuple[float, float], str] = {}
-    for f, channel, direction in wheels + body:
-        silent |= {g: channel.name for g in f.gaps}
-        if direction is not None:
-            momentum += np.outer(f.fit.value, direction)
-            torque += np.outer(f.fit.slope, direction)
-            variance += np.outer(f.variance([0, 1, 0]), direction**2)
-    if body:
-        torque += np.cross(np.stack([f.fit.value for f, _, _ in body], axis=1), momentum)
-    for j, channel in enumerate(pushed):
-        f = fit_on_grid(channel, grid, degree=3, half_width_s=width)
-        torque[:, j] -= f.fit.value
-        variance[:, j] += f.variance([1, 0, 0])
-        silent |= {g: channel.name for g in f.gaps}
-    doubts += gap_doubts(tlm, grid, silent)
-    settings = {"half_width_s": width, "degree": 3}
-    return grid, torque, np.sqrt(variance), momentum, settings, doubts
+
+def _rounding(step_s: float, torque, sigma, half_width_s: float, axes: tuple[int, ...]) -> Doubt | None:
+    """How much of each peak the window took."""
+    worst, noise = 0.0, 0.0
+    for j in axes:
+        loss = smoothing_loss(step_s, torque[:, j], half_width_s)
+        for k in excursions(torque[:, j], sigma[:, j]):
+            worst = max(worst, _FIRST_PASS * float(loss[k] / torque[k, j]))
+            noise = max(noise, 2 * float(sigma[k, j] / abs(torque[k, j])))
+    if worst < 0.02:
+        return None
+    if worst > 0.5:
+        return PEAKS_NOT_RESOLVED(half_width_s=half_width_s)
+    return PEAKS_ROUNDED(half_width_s=half_width_s, low_percent=100 * worst, noise_percent=100 * noise)
 
 
 def smoothing_loss(grid_step_s: float, torque: np.ndarray, half_width_s: float) -> np.ndarray:

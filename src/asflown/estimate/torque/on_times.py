@@ -1,4 +1,4 @@
-"""The torque of the surroundings on a craft that thrusters hold: what momentum and on-times leave (``on_times``), over time.
+"""The torque of the surroundings on a craft that thrusters hold: what momentum and on-times leave (``firing.impulse``), over time.
 
 The torque is a piecewise linear curve whose slope is a Wiener process, so that it may bend anywhere; how much it bends, here and
 there, is that for which the record is likeliest.  Thrust and fall time are solved for beside it.
@@ -7,20 +7,18 @@ there, is that for which the record is likeliest.  Thrust and fall time are solv
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import ClassVar
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from ...kit.doubts import Doubts, Kind, Severity
 from ...kit.errors import BadInput
+from ...kit.timeline import NS
 from ...telemetry.channels import AXES
-from ..firing import THRUST_SHARE, Gained, gained
-from ..subject import thrusters_firing
-from .result import TorqueResult
-
-if TYPE_CHECKING:
-    from ...craft.model import Craft
-    from ...telemetry.telemetry import Telemetry
+from ..firing import Gained, gained
+from ..subject import Grid, Subject
+from .answer import Answer, Method
 
 _FEWEST, _LONGEST = 20, 2000  # steps, knots
 _DRAWS = 300
@@ -35,6 +33,7 @@ class Smoothed:
     """Torque at knots (M,) [s from the epoch], its covariance, and the unknowns' values in sigmas (m,) with theirs."""
 
     time_s: np.ndarray
+    step_s: float
     torque_Nm: np.ndarray
     unknowns: np.ndarray
     root: np.ndarray  # (M + m, M + m), of the covariance: root^T root
@@ -49,37 +48,59 @@ class Smoothed:
         return self.torque_Nm + rng.standard_normal((count, len(self.root))) @ self.root[:, : len(self.time_s)]
 
 
-def torque_on_times(telemetry: Telemetry, craft: Craft, axis: str) -> tuple[TorqueResult, Gained]:
-    """About one axis, with its posterior's draws, and the steps it is from; the impulse between samples is in ``settings``.
+THRUST_NOT_FOUND = Kind(
+    "torque.thrust-not-found", Severity.CAUTION,
+    "the record hardly constrains the thrust: the value believed is used, and the torque's scale is as uncertain as that",
+    "Take a longer record, with more firings.",
+)  # fmt: skip
 
-    Raises BadInput where ``gained`` does, and for a record too short or too long."""
-    if not thrusters_firing(telemetry):
-        raise BadInput(
-            "no thruster fires in this record, so on-times tell nothing",
-            file=telemetry.source or None,
-            remedy="Use --method fused.",
-        )
-    g = gained(telemetry, craft, axis)
-    if len(g.impulse_Nms) < _FEWEST:
-        raise BadInput(
-            f"{len(g.impulse_Nms)} steps between samples of momentum and on-times are too few",
-            file=telemetry.source or None,
-            remedy=f"Take a record of at least {_FEWEST}.",
-        )
-    s = smoothed(g)
-    j, M = AXES.index(axis), len(s.time_s)
-    torque, sigma = np.full((M, 3), np.nan), np.full((M, 3), np.nan)
-    torque[:, j] = s.torque_Nm
-    sigma[:, j] = np.hypot(np.sqrt(np.diag(s.covariance)[:M]), g.inertia_share * s.torque_Nm)
-    rng = np.random.default_rng(1)
-    paths = np.full((_DRAWS, M, 3), np.nan)
-    paths[:, :, j] = s.draws(_DRAWS, rng) * (1 + g.inertia_share * rng.standard_normal((_DRAWS, 1)))
-    settings = g.settings | _thrust_found(g, s) | {"impulses": _impulses(g, s)}
-    result = TorqueResult(
-        craft=craft.name, method="on-times", variant="corrected", axis=axis, epoch=telemetry.epoch_label, time_s=s.time_s,
-        torque_Nm=torque, sigma_Nm=sigma, momentum_Nms=None, doubts=(*g.doubts, *_doubts(g, s)), settings=settings, paths_Nm=paths,
-    )  # fmt: skip
-    return result, g
+
+@dataclass(frozen=True, kw_only=True)
+class OnTimes(Method):
+    """The surroundings' torque about one axis, where thrusters hold the craft and how long each fired is telemetered."""
+
+    name: ClassVar[str] = "on-times"
+
+    def estimate(self, subject: Subject, axes: tuple[int, ...]) -> Answer:
+        """With draws from the posterior; the impulse between samples is in ``settings``.
+
+        Raises BadInput for several axes, where no thruster fires, where ``gained`` does, and for a record too short or long."""
+        source = subject.telemetry.source or None
+        if len(axes) != 1:
+            raise BadInput("on-times tell the torque about one axis at a time", remedy="Name one (--axis).")
+        if not subject.firing:
+            raise BadInput(
+                "no thruster fires in this record, so on-times tell nothing", file=source, remedy="Use --method fused."
+            )
+        j = axes[0]
+        g = gained(subject, AXES[j])
+        if len(g.impulse_Nms) < _FEWEST:
+            raise BadInput(
+                f"{len(g.impulse_Nms)} steps between samples of momentum and on-times are too few",
+                file=source,
+                remedy=f"Take a record of at least {_FEWEST}.",
+            )
+        s = smoothed(g)
+        M = len(s.time_s)
+        torque, sigma = np.full((2, M, 3), np.nan)
+        torque[:, j] = s.torque_Nm
+        sigma[:, j] = np.hypot(np.sqrt(np.diag(s.covariance)[:M]), g.inertia_share * s.torque_Nm)
+        rng = np.random.default_rng(1)
+        paths = np.full((_DRAWS, M, 3), np.nan)
+        paths[:, :, j] = s.draws(_DRAWS, rng) * (1 + g.inertia_share * rng.standard_normal((_DRAWS, 1)))
+        thrust = _thrust_found(g, s)
+        unsure = thrust and thrust["thrust_sigma_N"] > 0.5 * _thrust_sigma(g)
+        return Answer(
+            by=self, grid=_grid(subject, s), torque_Nm=torque, sigma_Nm=sigma, paths_Nm=paths, gained=g,
+            settings=g.settings | thrust | {"impulses": _impulses(g, s)},
+            doubts=Doubts([*g.doubts, THRUST_NOT_FOUND() if unsure else None]),
+        )  # fmt: skip
+
+
+def _grid(subject: Subject, s: Smoothed) -> Grid:
+    """The knots as a grid."""
+    start_ns = subject.telemetry.epoch_ns + round(float(s.time_s[0]) * NS)
+    return Grid(start_ns, s.step_s, len(s.time_s))
 
 
 def smoothed(g: Gained) -> Smoothed:
@@ -124,7 +145,7 @@ def smoothed(g: Gained) -> Smoothed:
         square = (D @ x[:count]) ** 2 + np.sum((root[:, :count] @ D.T) ** 2, axis=0)
         variance = np.maximum(near @ square, _LEAST * square.max())
     x, root = posterior(variance)
-    return Smoothed(knots, x[:count], x[count:], root)
+    return Smoothed(knots, step, x[:count], x[count:], root)
 
 
 def _nearby(count: int, reach: float) -> np.ndarray:
@@ -155,19 +176,14 @@ def _impulses(g: Gained, s: Smoothed) -> list[dict]:
     ]
 
 
+def _thrust_sigma(g: Gained) -> float:
+    """Of the thrust believed. [N]"""
+    return (g.thrust_believed_N or 0.0) * (g.thrust_share or 0.0)
+
+
 def _thrust_found(g: Gained, s: Smoothed) -> dict:
-    if "thrust" not in g.names:
+    if "thrust" not in g.names or g.thrust_believed_N is None or g.thrust_share is None:
         return {}
     k, M = g.names.index("thrust"), len(s.time_s)
-    believed = g.settings["thrust_believed_N"]
-    found = believed * (1 + THRUST_SHARE * float(s.unknowns[k]))
-    return {"thrust_N": found, "thrust_sigma_N": believed * THRUST_SHARE * float(np.sqrt(s.covariance[M + k, M + k]))}
-
-
-def _doubts(g: Gained, s: Smoothed) -> list[str]:
-    found = _thrust_found(g, s)
-    if found and found["thrust_sigma_N"] > 0.5 * THRUST_SHARE * g.settings["thrust_believed_N"]:
-        return [
-            "the record hardly tells the thrust: it is the one believed, and the torque's scale is as uncertain as that"
-        ]
-    return []
+    found = g.thrust_believed_N * (1 + g.thrust_share * float(s.unknowns[k]))
+    return {"thrust_N": found, "thrust_sigma_N": _thrust_sigma(g) * float(np.sqrt(s.covariance[M + k, M + k]))}

@@ -1,4 +1,4 @@
-"""Disturbance torque from polynomials fitted to a whole record (004 eqs 7, 8, 17, 18).
+"""Disturbance torque from polynomials fitted to a whole record (plume paper, eqs 7, 8, 17, 18).
 
 Two channels, as in the paper: total momentum by a 12th-order polynomial (15th and 18th tried there),
 whose derivative is the torque (eq 18); attitude error by a 6th-order one (eq 7), put through the
@@ -8,55 +8,81 @@ is 7 % low and 3 s early, the 6th 27 % low, and both swing at the ends.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
-from numpy.polynomial import Polynomial
+from numpy.polynomial import Polynomial as Fitted
 
 from ...dynamics.loop import hankel_order_two, low_order
-from ...kit.errors import BadInput
+from ...kit.doubts import Doubts, Kind, Severity
+from ...kit.errors import BadInput, check_choice
 from ...kit.timeline import NS
 from ...telemetry.channels import AXES
 from ..subject import Grid, Subject, actuators, fit_on_grid, gap_doubts, gaps_on_grid, grid_for
+from .answer import VARIANTS, Answer, Method
 from .momentum import HALF_WIDTH_S
 
 ORDERS = (6, 12, 15, 18)
 
 
-def polynomial(subject: Subject, order: int = 12, model: str = "low"):
-    """Returns grid, torque (M, 3), None, momentum or None, settings, doubts, fits.
+SWINGS = Kind(
+    "torque.polynomial-swings", Severity.CAUTION,
+    "polynomials over a whole record swing at its ends and round every peak", "Compare with --method fused or momentum.",
+)  # fmt: skip
 
-    Order 6 works on attitude error, the others on total momentum.  ``fits``: for every order and
-    axis the RMS misfit of the samples, absolute and as a percentage of their mean magnitude."""
-    if order not in ORDERS:
-        raise BadInput(f"polynomials of order {order} are not offered", remedy="Choose 6, 12, 15 or 18.")
-    tlm = subject.telemetry
-    samples = _momentum_samples(subject) if order != 6 or tlm.members("wheel_rate") else None
-    fits = []
-    if samples is not None:
-        for n in ORDERS[1:]:
-            fits += _fit_records(samples, n, "momentum", "Nms")
-    errors = {j: f"attitude_error_{a}" for j, a in enumerate(AXES) if f"attitude_error_{a}" in tlm}
-    if errors:
+
+@dataclass(frozen=True, kw_only=True)
+class Polynomial(Method):
+    """One polynomial an axis over the whole record; there is one way, so that both variants are the same.
+
+    ``order``: 6 fits attitude error, 12, 15 and 18 total momentum; ``model``: of the loop, low or hankel (order 6)."""
+
+    name: ClassVar[str] = "polynomial"
+    order: int = 12
+    model: str = "low"
+    variant: str = "corrected"
+
+    def __post_init__(self):
+        check_choice(self.variant, VARIANTS, "variant")
+        check_choice(self.order, ORDERS, "order")
+        check_choice(self.model, ("low", "hankel"), "model")
+
+    def estimate(self, subject: Subject, axes: tuple[int, ...]) -> Answer:  # noqa: ARG002 - all axes with a channel
+        """``Answer.fits``: for every order and axis the RMS misfit of the samples, absolute and in percent of their mean size."""
+        tlm = subject.telemetry
+        momentum = _momentum_samples(subject) if self.order != 6 or tlm.members("wheel_rate") else None
+        fits = [] if momentum is None else [f for n in ORDERS[1:] for f in _fit_records(momentum, n, "momentum", "Nms")]
+        errors = {j: f"attitude_error_{a}" for j, a in enumerate(AXES) if f"attitude_error_{a}" in tlm}
         for j, name in errors.items():
             c = tlm.channel(name).usable
-            t = (c.tai_ns - c.tai_ns[0]) / NS
-            _, rms, share = _fit(t, c.values, 6)
+            _, rms, share = _fit((c.tai_ns - c.tai_ns[0]) / NS, c.values, 6)
             fits.append({"order": 6, "channel": name, "axis": AXES[j], "rms_rad": rms, "rms_percent": share})
-    doubts = ["polynomials over a whole record swing at its ends and round every peak: compare with --method momentum"]
-    if order == 6:
-        grid, torque, how = _from_error(subject, errors, model)
-        return grid, torque, None, None, {"order": 6, "model": model, "rate_error": how}, doubts, fits
+        if momentum is None or self.order == 6:
+            grid, torque, how = _from_error(subject, errors, self.model)
+            settings = {"order": 6, "model": self.model, "rate_error": how}
+            return Answer(
+                by=self, grid=grid, torque_Nm=torque, settings=settings, doubts=Doubts([SWINGS()]), fits=tuple(fits)
+            )
+        grid, torque, smooth, silent = _from_momentum(subject, momentum, self.order)
+        return Answer(
+            by=self, grid=grid, torque_Nm=torque, momentum_Nms=smooth, settings={"order": self.order},
+            doubts=Doubts([SWINGS(), *gap_doubts(tlm, grid, silent)]), fits=tuple(fits),
+        )  # fmt: skip
+
+
+def _from_momentum(subject: Subject, samples, order: int):
+    """Plume paper eq 18: grid, torque and momentum (M, 3), null in gaps, and the gaps with their channel."""
     grid, t, H = samples
-    torque = np.full((grid.count, 3), np.nan)
-    smooth = np.full((grid.count, 3), np.nan)
-    silent = {g: c.name for c, _ in actuators(subject)[0] for g in gaps_on_grid(c, grid)}
-    doubts += gap_doubts(tlm, grid, silent)
+    torque, smooth = np.full((2, grid.count, 3), np.nan)
     for j in range(3):
         p, _, _ = _fit(t, H[:, j], order)
         smooth[:, j], torque[:, j] = p(grid.seconds), p.deriv()(grid.seconds)
+    silent = {g: c.name for c, _ in actuators(subject)[0] for g in gaps_on_grid(c, grid)}
     for a, b in silent:
         inside = (grid.seconds > a + 1e-9) & (grid.seconds < b - 1e-9)
         smooth[inside], torque[inside] = np.nan, np.nan
-    return grid, torque, None, smooth, {"order": order}, doubts, fits
+    return grid, torque, smooth, silent
 
 
 def _fit(t, y, order):
@@ -66,7 +92,7 @@ def _fit(t, y, order):
             f"{len(t)} samples are too few for a polynomial of order {order}",
             remedy="Take a longer record, or a lower --order.",
         )
-    p, (_, rank, _, _) = Polynomial.fit(t, y, order, full=True)  # asked for, so that numpy does not warn
+    p, (_, rank, _, _) = Fitted.fit(t, y, order, full=True)  # asked for, so that numpy does not warn
     if rank <= order:
         raise BadInput(
             f"a gap leaves too little of the record to hold a polynomial of order {order}",
@@ -120,7 +146,7 @@ def _fit_records(samples, order, channel, unit):
 
 
 def _from_error(subject: Subject, errors: dict[int, str], model: str):
-    """004 eqs 6-8: sixth-order polynomials of attitude error and, where telemetered, of the controller's rate error."""
+    """Plume paper eqs 6-8: sixth-order polynomials of attitude error and, where telemetered, of the controller's rate error."""
     tlm, k = subject.telemetry, subject.controller()
     if not errors:
         tlm.channel("attitude_error_y")

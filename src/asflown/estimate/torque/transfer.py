@@ -1,30 +1,42 @@
-"""Disturbance torque from attitude error, through the inverse of the closed loop (000 section IV).
+"""Disturbance torque from attitude error, through the inverse of the closed loop (cover paper, section IV).
 
-    T = -I (e'' + KD F(e') + KP KD e)                      full: the exact inverse of 000 eq 11
-    T = -I (e'' + KD e' + KP KD e)                         low: 000 eq 16, 004 eq 6
-    T = -(I/g) (e'' + d e' + k e)                          hankel: the way of 004 eqs 9, 10
+    T = -I (e'' + KD F(e') + KP KD e)                      full: the exact inverse of the cover paper's eq 11
+    T = -I (e'' + KD e' + KP KD e)                         low: cover paper eq 16, plume paper eq 6
+    T = -(I/g) (e'' + d e' + k e)                          hankel: plume paper eqs 9, 10
 
 F is the rate filter: the sixth-order loop has an inverse that is no harder than the low-order one,
 with the rate filtered.  e is commanded minus estimated attitude in a hold, so the body rate is -e'.
 
-``printed`` is the paper's way: e splined to 1 s, smoothed over 8 % of the record, differenced forward
+``printed`` is the papers' method: e splined to 1 s, smoothed over 8 % of the record, differenced forward
 twice (eqs 18, 19), low-order inverse.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from ...dynamics.loop import SecondOrder, filtered_rate, hankel_order_two, low_order
-from ...kit.errors import BadInput, some_of
+from ...kit.doubts import Doubts, Kind, Severity
+from ...kit.errors import BadInput, check_choice
 from ...kit.regression import LocalFit, local_polynomial
 from ...kit.timeline import NS, runs
 from ...telemetry.channels import AXES
-from ..subject import Grid, Subject, fit_on_grid, gap_doubts, gaps_on_grid, grid_for, splined
+from ..subject import (
+    Grid,
+    Subject,
+    changes_as_in_a_slew,
+    fit_on_grid,
+    gap_doubts,
+    gaps_on_grid,
+    grid_for,
+    splined,
+    turns,
+)
+from .answer import VARIANTS, Answer, Method, check_window
 from .momentum import HALF_WIDTH_S, smoothed_as_printed
 
 if TYPE_CHECKING:
@@ -35,82 +47,141 @@ MODELS = ("low", "hankel", "full")
 #: Half-width of the local cubic through attitude error, chosen by studies/error_window.py. [s]
 ERROR_HALF_WIDTH_S = 18.0
 
-_RATE_OF_A_SLEW = 5e-4  # rad/s: above it the record is no hold
+
+PRINTED = Kind(
+    "torque.printed-transfer", Severity.CAUTION,
+    "the printed method smooths over 8 % of the record ({span_s:.0f} s here), which takes 10-15 % off pulses of 30 s, 20-27 % off "
+    "pulses of 15 s, and half of those of 7-10 s",
+    "Use --variant corrected, or --method fused.",
+)  # fmt: skip
+NOT_HELD = Kind(
+    "torque.not-held", Severity.SUSPECT,
+    "the attitude is not held still: the transfer method assumes a hold, and commanded rates and accelerations are not in the "
+    "telemetry",
+    "Narrow the window to a hold with --start and --stop.",
+)  # fmt: skip
+WHITE_NOISE_ONLY = Kind(
+    "torque.white-noise-only", Severity.CAUTION,
+    "the band of the transfer method holds white noise only: slow (correlated) error of the attitude estimate is not in it",
+    "Use --method fused.",
+)  # fmt: skip
 
 
-def printed(subject: Subject, model: str = "low"):
-    """The paper's way. Returns grid, torque (M, 3), None, None, settings, doubts; NaN for axes without e."""
-    I_B = subject.known_inertia()
-    inverse = _second_order(subject, model)
-    channels = _errors(subject)
-    grid = grid_for(list(channels.values()), step_s=1.0)
-    torque = np.full((grid.count - 2, 3), np.nan)
-    span = 0
-    for j, channel in channels.items():
-        smooth, span = smoothed_as_printed(splined(channel, grid)[:, None])
-        e = smooth[:, 0]
-        rate = np.diff(e)
-        torque[:, j] = (
-            -I_B[j, j]
-            / inverse.gain
-            * (np.diff(rate) + inverse.damping_per_s * rate[:-1] + inverse.stiffness_per_s2 * e[:-2])
-        )
-    doubts = [
-        f"printed method: smoothing over 8 % of the record ({span} s here) takes 10-15 % off pulses of 30 s, 20-27 % off "
-        "pulses of 15 s, and half of those of 7-10 s"
-    ]
-    doubts += gap_doubts(subject.telemetry, grid, {g: c.name for c in channels.values() for g in gaps_on_grid(c, grid)})
-    return Grid(grid.start_ns, 1.0, grid.count - 2), torque, None, None, {"span_samples": span, "model": model}, doubts
+@dataclass(frozen=True, kw_only=True)
+class Transfer(Method):
+    """Attitude error through the inverse of the loop.
+
+    ``model``: one of MODELS; None: full, or low for the printed variant.  ``window_s``: full width of the local cubics, in
+    place of the studied one."""
+
+    name: ClassVar[str] = "transfer"
+    model: str | None = None
+    window_s: float | None = None
+    variant: str = "corrected"
+
+    def __post_init__(self):
+        check_choice(self.variant, VARIANTS, "variant")
+        check_choice(self.model, (None, *MODELS), "model")
+        check_window(self.window_s, self.variant)
+        if self.variant == "printed" and self.model == "full":
+            raise BadInput(
+                "the printed transfer method has no full model", remedy="Use --variant corrected --model full."
+            )
+
+    @property
+    def taken(self) -> str:
+        """The loop's model."""
+        return self.model or ("low" if self.variant == "printed" else "full")
+
+    def estimate(self, subject: Subject, axes: tuple[int, ...]) -> Answer:  # noqa: ARG002 - all axes with a channel
+        return self._printed(subject) if self.variant == "printed" else self._corrected(subject)
+
+    def _printed(self, subject: Subject) -> Answer:
+        """Torque is NaN for axes without attitude error."""
+        I_B = subject.known_inertia()
+        inverse = _second_order(subject, self.taken)
+        channels = _errors(subject)
+        grid = grid_for(list(channels.values()), step_s=1.0)
+        torque = np.full((grid.count - 2, 3), np.nan)
+        span = 0
+        for j, channel in channels.items():
+            smooth, span = smoothed_as_printed(splined(channel, grid)[:, None])
+            e = smooth[:, 0]
+            rate = np.diff(e)
+            torque[:, j] = (
+                -I_B[j, j]
+                / inverse.gain
+                * (np.diff(rate) + inverse.damping_per_s * rate[:-1] + inverse.stiffness_per_s2 * e[:-2])
+            )
+        silent = {g: c.name for c in channels.values() for g in gaps_on_grid(c, grid)}
+        return Answer(
+            by=self, grid=Grid(grid.start_ns, 1.0, grid.count - 2), torque_Nm=torque,
+            settings={"span_samples": span, "model": self.taken},
+            doubts=Doubts([PRINTED(span_s=span), *gap_doubts(subject.telemetry, grid, silent)]),
+        )  # fmt: skip
+
+    def _corrected(self, subject: Subject) -> Answer:
+        """The error smoothed once by local cubics, the chosen inverse applied, w x h added where the wheels are known.
+
+        Smoothed once, because value, slope and curvature of one local fit each have their own bandwidth:
+        an inverse put together from them is late by up to 2 s on 10-s excursions.  The rate error is taken
+        from telemetry where it is there: controller_rate_error (cover paper eq 17, plume paper eq 8), which has already
+        gone through the filter, or rate_error."""
+        I_B = subject.known_inertia()
+        tlm = subject.telemetry
+        width = ERROR_HALF_WIDTH_S if self.window_s is None else self.window_s / 2
+        channels = _errors(subject)
+        told = {j: _rate_channel(tlm, AXES[j]) for j in channels}
+        grid = grid_for([*channels.values(), *[c for c in told.values() if c is not None]])
+        inverse = None if self.taken == "full" else _second_order(subject, self.taken)
+        inverted = {j: _inverted(subject, inverse, grid, width, c, told[j]) for j, c in channels.items()}
+        acceleration, push, rate = np.full((3, grid.count, 3), np.nan)
+        variance = np.full((grid.count, 3), np.nan)
+        for j, found in inverted.items():
+            acceleration[:, j], push[:, j], rate[:, j] = found.motion
+            variance[:, j] = I_B[j, j] ** 2 * found.variance
+        gain = 1.0 if inverse is None else inverse.gain
+        if len(channels) == 3 and inverse is None:
+            torque = -(acceleration @ I_B + push * np.diag(I_B))
+        else:
+            torque = -np.diag(I_B) / gain * (acceleration + push)
+        if len(channels) == 3 and tlm.members("wheel_rate") and not subject.relative:
+            torque += np.cross(-rate, _wheel_momentum(subject, grid))  # in a hold the body turns at -e'
+        silent = {g: name for found in inverted.values() for g, name in found.gaps.items()}
+        told_by_error = rate[:, list(channels)]
+        told_by_error = told_by_error[np.isfinite(told_by_error).all(axis=1)]
+        moves = subject.slewing or turns(tlm) or changes_as_in_a_slew(told_by_error)
+        return Answer(
+            by=self, grid=grid, torque_Nm=torque, sigma_Nm=np.sqrt(variance) / gain,
+            settings={"half_width_s": width, "degree": 3, "model": self.taken},
+            doubts=Doubts([*gap_doubts(tlm, grid, silent), NOT_HELD() if moves else None, WHITE_NOISE_ONLY()]),
+        )  # fmt: skip
 
 
-def corrected(subject: Subject, model: str = "full", window_s: float | None = None):
-    """Attitude error smoothed once by local cubics, the chosen inverse applied, w x h added where the wheels are known.
+@dataclass(frozen=True)
+class _Inverted:
+    """One axis: e'', the rest of the bracket and e' (3, M); variance (M,) of the bracket; gaps with their channel."""
 
-    Smoothed once, because value, slope and curvature of one local fit have each their own bandwidth:
-    an inverse put together from them is late by up to 2 s on 10-s excursions.  The rate error is taken
-    from telemetry where it is there: controller_rate_error (000 eq 17, 004 eq 8), which has already gone
-    through the filter, or rate_error.  Returns as ``printed``, with sigma (M, 3)."""
-    I_B = subject.known_inertia()
-    tlm, k = subject.telemetry, subject.controller()
-    width = ERROR_HALF_WIDTH_S if window_s is None else window_s / 2
-    channels = _errors(subject)
-    rate_channels = {j: _rate_channel(tlm, AXES[j]) for j in channels}
-    grid = grid_for([*channels.values(), *[c for c in rate_channels.values() if c is not None]])
-    inverse = None if model == "full" else _second_order(subject, model)
-    acceleration, push, rate = np.full((3, grid.count, 3), np.nan)
-    variance = np.full((grid.count, 3), np.nan)
-    silent: dict[tuple[float, float], str] = {}
-    for j, channel in channels.items():
-        f = fit_on_grid(channel, grid, degree=3, half_width_s=width)
-        silent |= {g: channel.name for g in f.gaps}
-        told, extra = None, 0.0
-        if rate_channels[j] is not None:
-            r = fit_on_grid(rate_channels[j], grid, degree=3, half_width_s=width)
-            silent |= {g: rate_channels[j].name for g in r.gaps}
-            told, extra = r.fit.value, k.kd_per_s**2 * r.variance([1, 0, 0])
-        stride = max(1, round(channel.cadence_ns / NS / grid.step_s))
-        loop = _Inverse(k, inverse, grid.step_s, stride, None if told is None else rate_channels[j].kind.stem)
-        acceleration[:, j], push[:, j], rate[:, j] = loop.apply(f.fit.value, told)
-        stiff = k.kp_per_s * k.kd_per_s
-        widened = f.widened @ np.square([stiff, k.kd_per_s, 1.0])
-        variance[:, j] = I_B[j, j] ** 2 * (_noise_gain(loop, channel, grid, width, f) * f.sigma**2 + widened + extra)
-    gain = 1.0 if inverse is None else inverse.gain
-    if len(channels) == 3 and inverse is None:
-        torque = -(acceleration @ I_B + push * np.diag(I_B))
-    else:
-        torque = -np.diag(I_B) / gain * (acceleration + push)
-    if len(channels) == 3 and tlm.members("wheel_rate") and not subject.relative:
-        torque += np.cross(-rate, _wheel_momentum(subject, grid))  # in a hold the body turns at -e'
-    doubts = gap_doubts(tlm, grid, silent)
-    if np.nanmax(np.abs(rate)) > _RATE_OF_A_SLEW or _turning(tlm):
-        doubts.append(
-            "the attitude is not held still: the transfer method assumes a hold, and commanded rates and accelerations are "
-            "not in the telemetry"
-        )
-    doubts.append(
-        "the band of the transfer method holds independent noise only: slow (coloured) attitude-estimate error is not in it"
-    )
-    return grid, torque, np.sqrt(variance) / gain, None, {"half_width_s": width, "degree": 3, "model": model}, doubts
+    motion: np.ndarray
+    variance: np.ndarray
+    gaps: dict[tuple[float, float], str]
+
+
+def _inverted(subject: Subject, inverse: SecondOrder | None, grid: Grid, width: float, channel, rate) -> _Inverted:
+    """``channel``: attitude error; ``rate``: the rate error told, or None."""
+    k = subject.controller()
+    f = fit_on_grid(channel, grid, degree=3, half_width_s=width)
+    gaps = dict.fromkeys(f.gaps, channel.name)
+    told, extra = None, 0.0
+    if rate is not None:
+        r = fit_on_grid(rate, grid, degree=3, half_width_s=width)
+        gaps |= dict.fromkeys(r.gaps, rate.name)
+        told, extra = r.fit.value, k.kd_per_s**2 * r.variance([1, 0, 0])
+    stride = max(1, round(channel.cadence_ns / NS / grid.step_s))
+    loop = _Inverse(k, inverse, grid.step_s, stride, None if rate is None else rate.kind.stem)
+    widened = f.widened @ np.square([k.kp_per_s * k.kd_per_s, k.kd_per_s, 1.0])
+    variance = _noise_gain(loop, channel, grid, width, f) * f.sigma**2 + widened + extra
+    return _Inverted(loop.apply(f.fit.value, told), variance, gaps)
 
 
 @dataclass(frozen=True)
@@ -183,15 +254,9 @@ def _errors(subject: Subject) -> dict:
     return channels
 
 
-def _second_order(subject: Subject, model: str):
+def _second_order(subject: Subject, model: str) -> SecondOrder:
     k = subject.controller()
-    if model == "low":
-        return low_order(k)
-    if model == "hankel":
-        return hankel_order_two(k)
-    raise BadInput(
-        f"model {model!r} is not known here", remedy=f"Choose one of {some_of(MODELS)} (printed: low or hankel)."
-    )
+    return low_order(k) if model == "low" else hankel_order_two(k)
 
 
 def _rate_channel(tlm, axis: str):
@@ -209,8 +274,3 @@ def _wheel_momentum(subject: Subject, grid: Grid) -> np.ndarray:
         value = np.interp(grid.seconds, grid.seconds[known], f.value[known])
         h += np.outer(value, wheel.spin_inertia * np.asarray(wheel.axis))
     return h
-
-
-def _turning(tlm) -> bool:
-    rates = [tlm.channel(f"body_rate_{a}").usable.values for a in AXES if f"body_rate_{a}" in tlm]
-    return any(len(r) and np.percentile(np.abs(r), 90) > _RATE_OF_A_SLEW / 5 for r in rates)

@@ -1,8 +1,6 @@
 """Bearing drag of the wheels, and how they were used."""
 
 from .result import RUN_DOWN, WheelDrag, WheelsResult
-from .study import wheel_drag
+from .study import wheels
 
-__all__ = [
-    "RUN_DOWN", "WheelDrag", "WheelsResult", "wheel_drag",
-]  # fmt: skip
+__all__ = ["RUN_DOWN", "WheelDrag", "WheelsResult", "wheels"]

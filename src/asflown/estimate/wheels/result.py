@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from ...kit.digits import plus_minus
+from ...kit.errors import some_of
+from ...kit.result import Estimate, per_spin_inertia, with_old_keys
+from ...kit.schema import Annotated, Doc, NotRequired, Number, Numbers, TypedDict
+from ...kit.table import Table
 
 if TYPE_CHECKING:
     from .run_downs import RunDown
@@ -18,27 +22,106 @@ RUN_DOWN, FLIGHT_SOFTWARE, COMMAND = "run-down", "flight software estimate", "co
 #: The split of drag into both parts is doubted where it is uncertain by this share of the drag.
 _SPLIT = 0.1
 _RPM = 60 / (2 * np.pi)
+#: Spikes of one wheel in the text.
+_MOST_SPIKES = 12
+
+#: Keys of a fit in earlier versions.
+_OLD_FIT_KEYS = {
+    "sigma_coulomb_Nm": "coulomb_sigma_Nm",
+    "sigma_viscous_Nms": "viscous_sigma_Nms",
+    "sigma_drag_at_mean_Nm": "drag_at_mean_sigma_Nm",
+    "told_apart": "separable",
+    "sigma_coulomb_per_spin_inertia_rad_s2": "coulomb_sigma_per_spin_inertia_rad_s2",
+    "sigma_viscous_per_spin_inertia_per_s": "viscous_sigma_per_spin_inertia_per_s",
+    "sigma_drag_at_mean_per_spin_inertia_rad_s2": "drag_at_mean_sigma_per_spin_inertia_rad_s2",
+}
+
+
+class DragRecord(TypedDict):
+    """One way to the drag of a wheel; null where there is none.  Where the spin inertia is unknown the keys in N m and N m s are
+    null and their siblings per unit spin inertia hold the values."""
+
+    coulomb_Nm: Number
+    coulomb_sigma_Nm: Number
+    viscous_Nms: Number
+    viscous_sigma_Nms: Number
+    correlation: Annotated[Number, Doc("of both parts")]
+    drag_at_mean_Nm: Annotated[Number, Doc("their sum at mean_rate_rad_s, which is known better than either")]
+    drag_at_mean_sigma_Nm: Number
+    mean_rate_rad_s: Annotated[Number, Doc("mean |rate| of the samples used")]
+    separable: Annotated[bool | None, Doc("whether the split into both parts is known to 10 % of the drag")]
+    basis: Annotated[str | None, Doc("run-down, flight software estimate or command")]
+    coulomb_per_spin_inertia_rad_s2: NotRequired[Number]
+    coulomb_sigma_per_spin_inertia_rad_s2: NotRequired[Number]
+    viscous_per_spin_inertia_per_s: NotRequired[Number]
+    viscous_sigma_per_spin_inertia_per_s: NotRequired[Number]
+    drag_at_mean_per_spin_inertia_rad_s2: NotRequired[Number]
+    drag_at_mean_sigma_per_spin_inertia_rad_s2: NotRequired[Number]
+
+
+class RunDownRecord(TypedDict):
+    start_s: Number
+    stop_s: Number
+    from_rad_s: Number
+    to_rad_s: Number
+    samples: int
+    rms_residual_rad_s: Number
+    found_by: Annotated[str, Doc("named (by the user) or shape")]
+
+
+class SpikeRecord(TypedDict):
+    time_s: Number
+    drag_Nm: Number
+    excess_Nm: Number
+    duration_s: Number
+
+
+class WheelRecord(DragRecord):
+    """One wheel, with the best way to its drag."""
+
+    name: str
+    spin_inertia_kgm2: Number
+    run_downs: list[RunDownRecord]
+    spikes: Annotated[list[SpikeRecord] | None, Doc("null where there is no estimate of drag to look in")]
+    low_speed_dwell_s: Number
+    zero_crossings: int
+    zero_crossing_times_s: Numbers
+    revolutions: Number
+    largest_rate_rad_s: Number
+    rate_limit_rad_s: Number
+    seen_s: Number
+    gaps_s: Number
+    other_bases: Annotated[list[DragRecord], Doc("the same drag by other ways")]
+
+
+class WheelsRecord(TypedDict):
+    """JSON of `asflown wheels`."""
+
+    craft: str
+    epoch: str
+    low_speed_rad_s: Number
+    wheels: list[WheelRecord]
 
 
 @dataclass(frozen=True)
 class DragFit:
-    """drag = coulomb + viscous |rate|, opposing the rate; SI, or per unit spin inertia where ``relative``.
+    """drag = Coulomb + viscous |rate|, opposing the rate; per unit spin inertia (rad/s^2, 1/s) where ``relative``.
 
     Sigmas hold the scatter of the samples.  The spin inertia's own error scales a run-down's drag and is not in them."""
 
     basis: str
-    coulomb: float
-    sigma_coulomb: float
-    viscous: float
-    sigma_viscous: float
+    coulomb_Nm: float
+    coulomb_sigma_Nm: float
+    viscous_Nms: float
+    viscous_sigma_Nms: float
     correlation: float
-    at_mean: float  # drag at ``mean_rate``, which is known better than either part
-    sigma_at_mean: float
-    mean_rate: float  # mean |rate| of the samples used
+    drag_at_mean_Nm: float  # at ``mean_rate_rad_s``, known better than either part
+    drag_at_mean_sigma_Nm: float
+    mean_rate_rad_s: float  # mean |rate| of the samples used
     relative: bool = False
 
     @classmethod
-    def from_law(cls, basis, values, covariance, rate: float, scale: float = 1.0, relative=False) -> DragFit:
+    def from_law(cls, basis, values, covariance, rate: float, *, scale: float = 1.0, relative: bool = False) -> DragFit:
         values, covariance = scale * np.asarray(values, float), scale**2 * np.asarray(covariance, float)
         sigma = np.sqrt(np.diag(covariance))
         at = np.array([1.0, rate])
@@ -50,47 +133,40 @@ class DragFit:
         )  # fmt: skip
 
     @property
-    def told_apart(self) -> bool:
-        """Whether the split between both parts means something."""
-        return bool(self.sigma_viscous * self.mean_rate <= _SPLIT * abs(self.at_mean))
+    def separable(self) -> bool:
+        """Whether the split into both parts is known well enough."""
+        return bool(self.viscous_sigma_Nms * self.mean_rate_rad_s <= _SPLIT * abs(self.drag_at_mean_Nm))
 
-    def drag(self, rate) -> np.ndarray:
+    def drag(self, rate_rad_s) -> np.ndarray:
         """Size of the drag at these rates."""
-        return self.coulomb + self.viscous * np.abs(rate)
+        return self.coulomb_Nm + self.viscous_Nms * np.abs(rate_rad_s)
 
-    def sigma(self, rate) -> np.ndarray:
-        """One sigma of ``drag``, spread from the mean rate, where it is smallest."""
-        off = np.abs(np.asarray(rate, float)) - self.mean_rate
-        return np.hypot(self.sigma_at_mean, off * self.sigma_viscous)
+    def sigma(self, rate_rad_s) -> np.ndarray:
+        """One sigma of ``drag``; smallest at the mean rate."""
+        off = np.abs(np.asarray(rate_rad_s, float)) - self.mean_rate_rad_s
+        return np.hypot(self.drag_at_mean_sigma_Nm, off * self.viscous_sigma_Nms)
 
     def record(self) -> dict:
-        in_torque = {
-            "coulomb_Nm": self.coulomb,
-            "sigma_coulomb_Nm": self.sigma_coulomb,
-            "viscous_Nms": self.viscous,
-            "sigma_viscous_Nms": self.sigma_viscous,
+        record = {
+            "coulomb_Nm": self.coulomb_Nm,
+            "coulomb_sigma_Nm": self.coulomb_sigma_Nm,
+            "viscous_Nms": self.viscous_Nms,
+            "viscous_sigma_Nms": self.viscous_sigma_Nms,
             "correlation": self.correlation,
-            "drag_at_mean_Nm": self.at_mean,
-            "sigma_drag_at_mean_Nm": self.sigma_at_mean,
-            "mean_rate_rad_s": self.mean_rate,
-            "told_apart": self.told_apart,
+            "drag_at_mean_Nm": self.drag_at_mean_Nm,
+            "drag_at_mean_sigma_Nm": self.drag_at_mean_sigma_Nm,
+            "mean_rate_rad_s": self.mean_rate_rad_s,
+            "separable": self.separable,
             "basis": self.basis,
         }
-        if not self.relative:
-            return in_torque
-        # a number per unit spin inertia must not stand under a key that says N m
-        moved = {
-            n.replace("_Nms", "_per_spin_inertia_per_s").replace("_Nm", "_per_spin_inertia_rad_s2"): v
-            for n, v in in_torque.items()
-            if "_Nm" in n
-        }
-        return {n: None if "_Nm" in n else v for n, v in in_torque.items()} | moved
+        if self.relative:
+            per_spin_inertia(record, [n for n in record if n.endswith("_Nm")])
+            for name in ("viscous", "viscous_sigma"):  # per rad/s: 1/s, where a momentum would be rad/s
+                record[f"{name}_per_spin_inertia_per_s"], record[f"{name}_Nms"] = record[f"{name}_Nms"], None
+        return record
 
 
-_NOTHING = dict.fromkeys(
-    ("coulomb_Nm", "sigma_coulomb_Nm", "viscous_Nms", "sigma_viscous_Nms", "correlation", "drag_at_mean_Nm",
-     "sigma_drag_at_mean_Nm", "mean_rate_rad_s", "told_apart", "basis")
-)  # fmt: skip
+_NO_FIT = dict.fromkeys(n for n in DragRecord.__annotations__ if "_per_spin_inertia_" not in n)
 
 
 @dataclass(frozen=True)
@@ -109,17 +185,18 @@ class Spike:
 
 @dataclass(frozen=True)
 class DragSamples:
-    """The flight software's own estimates, opposing the rate: evidence, and where spikes are looked for."""
+    """The flight software's own estimates (N,), opposing the rate: evidence, and where spikes are looked for."""
 
     time_s: np.ndarray
     rate_rad_s: np.ndarray
     drag_Nm: np.ndarray
     used: np.ndarray  # (N,) bool
+    spiked: np.ndarray  # (N,) bool
 
 
 @dataclass(frozen=True)
 class WheelDrag:
-    """One wheel.  ``fits``: every way its drag could be had, the best one first; empty where there is none.
+    """One wheel.  ``fits``: every way to its drag, the best one first; empty where there is none.
 
     ``spikes``: None where the file holds nothing to look for them in."""
 
@@ -139,9 +216,12 @@ class WheelDrag:
         return self.fits[0] if self.fits else None
 
     def record(self) -> dict:
+        others = [f.record() for f in self.fits[1:]]
+        for other in others:
+            with_old_keys(other, _OLD_FIT_KEYS)
         return {
             "name": self.name,
-            **(self.fit.record() if self.fit else _NOTHING),
+            **(self.fit.record() if self.fit else _NO_FIT),
             "spin_inertia_kgm2": self.spin_inertia_kgm2,
             "run_downs": [r.record() for r in self.run_downs],
             "spikes": None if self.spikes is None else [s.record() for s in self.spikes],
@@ -153,66 +233,85 @@ class WheelDrag:
             "rate_limit_rad_s": self.rate_limit_rad_s,
             "seen_s": self.use.seen_s,
             "gaps_s": self.use.gaps_s,
-            "other_bases": [f.record() for f in self.fits[1:]],
+            "other_bases": others,
         }
 
 
-@dataclass(frozen=True)
-class WheelsResult:
-    """Every wheel of a record.  Times count from the telemetry's epoch; what is not known is null."""
+@dataclass(frozen=True, kw_only=True, repr=False)
+class WheelsResult(Estimate):
+    """Every wheel of a record.  Times count from the telemetry's epoch.  ``low_speed_rad_s``: below it a wheel dwells."""
 
-    craft: str
-    epoch: str
+    RECORD: ClassVar[type] = WheelsRecord
+    OLD_KEYS: ClassVar[dict[str, str]] = {f"wheels[].{before}": now for before, now in _OLD_FIT_KEYS.items()}
+
     low_speed_rad_s: float
     wheels: tuple[WheelDrag, ...]
-    doubts: tuple[str, ...] = ()
 
     def wheel(self, name: str) -> WheelDrag:
         return next(w for w in self.wheels if w.name == name)
 
-    def record(self) -> dict:
-        """The JSON form, without command and provenance."""
+    def _record(self) -> dict:
         return {
             "craft": self.craft,
             "epoch": self.epoch,
             "low_speed_rad_s": self.low_speed_rad_s,
             "wheels": [w.record() for w in self.wheels],
-            "doubts": list(self.doubts),
         }
 
-    def __str__(self) -> str:
-        """The table a person scans."""
-        lines = [f"Wheels · {self.craft} · epoch {self.epoch}"]
-        for w in self.wheels:
-            lines += ["  " + w.name, *("    " + line for line in _told(w, self.low_speed_rad_s))]
-        return "\n".join(lines)
-
-
-def _told(w: WheelDrag, low_rad_s: float):
-    if w.fit is None:
-        yield "drag          not known"
-    for f in w.fits:
-        unit, per_rate = ("rad/s^2", "1/s") if f.relative else ("mN m", "µN m s")
-        scale, fine, of = (1.0, 1.0, ", per unit spin inertia") if f.relative else (1e3, 1e6, "")
-        yield f"drag          from {f.basis}{of}"
-        if f.told_apart:
-            yield f"  coulomb     {plus_minus(scale * f.coulomb, scale * f.sigma_coulomb)} {unit}"
-            yield f"  viscous     {plus_minus(fine * f.viscous, fine * f.sigma_viscous)} {per_rate}   correlation {f.correlation:+.3f}"
-        else:
-            yield "  coulomb and viscous drag are not told apart"
-        at = plus_minus(scale * f.at_mean, scale * f.sigma_at_mean)
-        yield f"  together    {at} {unit} at {_RPM * f.mean_rate:.0f} rpm"
-    for r in w.run_downs:
-        yield (
-            f"run-down      {r.start_s:.0f} to {r.stop_s:.0f} s, {_RPM * r.from_rad_s:.1f} to {_RPM * r.to_rad_s:.1f} rpm"
+    def _tables(self) -> tuple[Table, ...]:
+        """Use, then drag in N m, drag per unit spin inertia, run-downs and spikes, where there are any."""
+        unknown = [w.name for w in self.wheels if not w.fits]
+        use = Table(
+            f"Wheels · {self.craft} · epoch {self.epoch}",
+            tuple(_use_row(w) for w in self.wheels),
+            ("wheel", "seen [s]", "revolutions", f"below {_RPM * self.low_speed_rad_s:.0f} rpm [s]", "zero crossings", "largest [rpm]"),
+            (f"drag not known: {some_of(unknown)}",) if unknown else (),
+        )  # fmt: skip
+        fits = [(w.name, f) for w in self.wheels for f in w.fits]
+        head = ("wheel", "from", "Coulomb [mN m]", "viscous [µN m s]", "sum [mN m]", "at [rpm]")
+        relative = ("wheel", "from", "Coulomb [rad/s^2]", "viscous [1/s]", "sum [rad/s^2]", "at [rpm]")
+        run_downs = tuple(
+            (w.name, f"{r.start_s:.0f} to {r.stop_s:.0f}", f"{_RPM * r.from_rad_s:.1f} to {_RPM * r.to_rad_s:.1f}", str(len(r.time_s)))
+            for w in self.wheels for r in w.run_downs
+        )  # fmt: skip
+        spikes = tuple(
+            (w.name, f"{s.time_s:.0f}", f"{s.duration_s:.0f}", f"{1e3 * s.drag_Nm:.2f}")
+            for w in self.wheels for s in (w.spikes or ())[:_MOST_SPIKES]
+        )  # fmt: skip
+        more = tuple(
+            f"and {len(w.spikes) - _MOST_SPIKES} more of {w.name}"
+            for w in self.wheels
+            if w.spikes and len(w.spikes) > _MOST_SPIKES
         )
-    for s in (w.spikes or ())[:12]:
-        yield f"drag spike    {1e3 * s.drag_Nm:.2f} mN m at {s.time_s:.0f} s for {s.duration_s:.0f} s"
-    if w.spikes and len(w.spikes) > 12:
-        yield f"              and {len(w.spikes) - 12} more"
+        tables = (
+            Table("Drag", tuple(_fit_row(n, f, 1e3, 1e6) for n, f in fits if not f.relative), head),
+            Table("Drag per unit spin inertia", tuple(_fit_row(n, f, 1.0, 1.0) for n, f in fits if f.relative), relative),
+            Table("Run-downs", run_downs, ("wheel", "time [s]", "rate [rpm]", "samples")),
+            Table("Drag spikes", spikes, ("wheel", "time [s]", "duration [s]", "drag [mN m]"), more),
+        )  # fmt: skip
+        return (use, *(t for t in tables if t.rows))
+
+
+def _use_row(w: WheelDrag) -> tuple[str, ...]:
     u = w.use
-    times = "once" if u.zero_crossings == 1 else f"{u.zero_crossings} times"
-    yield (
-        f"use           {u.revolutions:.1f} revolutions in {u.seen_s:.0f} s; {u.low_speed_dwell_s:.0f} s below "
-        f"{_RPM * low_rad_s:.0f} rpm; zero crossed {times}; largest {_RPM * u.largest_rate_rad_s:.1f} rpm"
+    largest = f"{_RPM * u.largest_rate_rad_s:.1f}"
+    return (
+        w.name,
+        f"{u.seen_s:.0f}",
+        f"{u.revolutions:.1f}",
+        f"{u.low_speed_dwell_s:.0f}",
+        str(u.zero_crossings),
+        largest,
     )
+
+
+def _fit_row(name: str, f: DragFit, scale: float, fine: float) -> tuple[str, ...]:
+    """One way to a wheel's drag; ``scale``, ``fine``: to the units of torque and of torque per rate."""
+    parts = ("not separable", "")
+    if f.separable:
+        parts = (
+            plus_minus(scale * f.coulomb_Nm, scale * f.coulomb_sigma_Nm),
+            plus_minus(fine * f.viscous_Nms, fine * f.viscous_sigma_Nms),
+        )
+    together = plus_minus(scale * f.drag_at_mean_Nm, scale * f.drag_at_mean_sigma_Nm)
+    return (name, f.basis, *parts, together, f"{_RPM * f.mean_rate_rad_s:.0f}")

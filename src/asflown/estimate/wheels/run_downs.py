@@ -1,4 +1,4 @@
-"""Run-downs: a wheel whose motor is off, left to its bearing, and what its course says of the drag.
+"""Run-downs: a wheel whose motor is off slows by its bearing alone, and its course shows the drag.
 
     J du/dt = -(coulomb + viscous u),   u = |rate|;   with a = coulomb / J, b = viscous / J and s from the middle
     u(s) = u_m exp(-b s) - a s phi(b s),   phi(x) = (1 - exp(-x)) / x
@@ -18,6 +18,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
+from ...kit.scatter import robust_sigma
 from ...kit.timeline import runs
 from ...telemetry.screening import quantisation_step
 
@@ -56,7 +57,7 @@ class RunDown:
     rate_rad_s: np.ndarray  # (N,)
     fit_rad_s: np.ndarray  # (N,)
 
-    def slowing(self, blocks: int = 16) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def slowing_rad_s2(self, blocks: int = 16) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Mean rate, slowing of |rate| and its sigma in blocks, by straight lines: to look at, not to fit."""
         rows = []
         for part in np.array_split(np.arange(len(self.time_s)), max(min(blocks, len(self.time_s) // 4), 1)):
@@ -85,14 +86,12 @@ class Coasting:
     """Constant and proportional part of the slowing of a wheel, from all its run-downs together.
 
     ``values``: a [rad/s^2] and b [1/s]; ``covariance`` of both; ``rate``: mean |rate| of the samples [rad/s];
-    ``misfit``: slow residuals' chi square per degree of freedom, by which the covariance is widened where it is no
-    chance; ``left_out``: outliers."""
+    ``misfit``: reduced chi square of the slow residuals, by which the covariance is widened where it is significant."""
 
     values: np.ndarray
     covariance: np.ndarray
     rate: float
     misfit: float
-    left_out: int
     run_downs: tuple[RunDown, ...]
 
 
@@ -172,16 +171,16 @@ def slow_misfit(spans: list[Span], residuals: list[np.ndarray], sigma: float) ->
 def own_noise(values: np.ndarray, seconds: np.ndarray) -> float:
     """White noise of one sample, from how far each lies off the line between its neighbours; 0 for too few. [rad/s]
 
-    A median, so that kicks and corners do not count."""
+    Unlike ``difference_sigma`` it takes uneven times, which wheels' records have."""
     if len(values) < 3:
         return 0.0
     share = (seconds[2:] - seconds[1:-1]) / (seconds[2:] - seconds[:-2])
     off = values[1:-1] - share * values[:-2] - (1 - share) * values[2:]
-    return float(np.median(np.abs(off) / np.sqrt(1 + share**2 + (1 - share) ** 2))) / 0.67449
+    return float(robust_sigma(off / np.sqrt(1 + share**2 + (1 - share) ** 2)))
 
 
 class Finder:
-    """Looks for run-downs in one wheel's samples: stretches that slow as a bearing alone would have it."""
+    """Looks for run-downs in one wheel's samples: stretches that slow as a bearing alone would slow it."""
 
     def __init__(self, channel: Channel, seconds: np.ndarray):
         c = channel.usable
@@ -279,8 +278,8 @@ def _farthest(good, start: int, limit: int) -> int:
     return end
 
 
-def together(finder: Finder, spans: list[tuple[int, int]], named: bool) -> Coasting:
-    """One drag law for all run-downs of a wheel, each with a rate of its own to start from."""
+def common_law(finder: Finder, spans: list[tuple[int, int]], *, named: bool) -> Coasting:
+    """One drag law for all run-downs of a wheel, each with a start rate of its own; ``named``: by the user."""
     parts = [finder.span(a, b) for a, b in spans]
     keep = [np.ones(len(p.s), bool) for p in parts]
     for _ in range(5):
@@ -288,7 +287,7 @@ def together(finder: Finder, spans: list[tuple[int, int]], named: bool) -> Coast
         x, inverse, residuals = fit_coasts(used)
         sizes = np.concatenate(residuals)
         sigma = float(np.sqrt(np.sum(sizes**2) / max(len(sizes) - len(x), 1)))
-        limit = _FAR * max(1.4826 * float(np.median(np.abs(sizes))), finder.quantum / np.sqrt(12))
+        limit = _FAR * max(robust_sigma(sizes), finder.quantum / np.sqrt(12))
         again = [np.abs(p.u - coast(p.s, m, x[0], x[1])) <= limit if limit > 0 else k
                  for p, m, k in zip(parts, x[2:], keep, strict=True)]  # fmt: skip
         if all(np.array_equal(k, n) for k, n in zip(keep, again, strict=True)) or min(map(np.sum, again)) < FEWEST // 2:
@@ -305,5 +304,4 @@ def together(finder: Finder, spans: list[tuple[int, int]], named: bool) -> Coast
             finder.t[a:b][k], finder.rate[a:b][k], fit[k],
         ))  # fmt: skip
     rate = float(np.mean(np.concatenate([p.u for p in used])))
-    left_out = int(sum((~k).sum() for k in keep))
-    return Coasting(x[:2], widened * sigma**2 * inverse[:2, :2], rate, widened, left_out, tuple(found))
+    return Coasting(x[:2], widened * sigma**2 * inverse[:2, :2], rate, widened, tuple(found))

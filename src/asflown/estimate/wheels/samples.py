@@ -2,29 +2,37 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+from ...kit.scatter import robust_sigma
+from .doubts import MAGNITUDE, ON_THE_WHEEL
+
+if TYPE_CHECKING:
+    from ...kit.doubts import Kind
 
 #: A spike stands out by this many robust sigma.
 _SPIKE = 6.0
 
 
-def opposing(rate, drag, slow: float) -> tuple[np.ndarray, str]:
-    """Drag as a size that opposes the rate, whichever of three conventions it came in, and what was found of that.
+def opposing(rate, drag, slow: float) -> tuple[np.ndarray, Kind | None]:
+    """Drag as a size that opposes the rate, whichever of three conventions it came in, and the doubt of another one.
 
     ``slow``: below this |rate| a sample says nothing of the convention."""
     ways = [w * float(np.median(drag[w * rate > slow])) for w in (1, -1) if (w * rate > slow).sum() > 2]
     if not ways or min(ways) >= 0:
-        return drag * np.sign(rate), ""
+        return drag * np.sign(rate), None
     if max(ways) <= 0:
-        return -drag * np.sign(rate), "has the sign opposite to the rate: taken as the torque on the wheel"
-    return drag * np.sign(np.median(drag)), "has one sign for both senses of rotation: taken as a size"
+        return -drag * np.sign(rate), ON_THE_WHEEL
+    return drag * np.sign(np.median(drag)), MAGNITUDE
 
 
 def find_spikes(time_s, excess, drag, moving, used) -> list[tuple[float, float, float, float]]:
     """(time, drag, excess, duration) of excesses above _SPIKE robust sigma of the others, while the wheel turns.
 
     Runs with one sample between them are one spike."""
-    sigma = 1.4826 * float(np.median(np.abs(excess[used]))) if used.any() else 0.0
+    sigma = robust_sigma(excess[used]) if used.any() else 0.0
     at = np.flatnonzero(moving & (excess > _SPIKE * sigma))
     if sigma == 0 or not len(at):
         return []

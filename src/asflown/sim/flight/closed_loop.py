@@ -9,6 +9,7 @@ import numpy as np
 
 from ...craft.load import load_craft
 from ...craft.model import Craft, CraftAt
+from ...kit.doubts import Doubts
 from ...kit.errors import BadInput, some_of
 from ...kit.rotations import rotation
 from ...telemetry.channels import AXES
@@ -20,7 +21,7 @@ from .disturbances import profile_peaks, torque_table
 from .faults import coasting, drag_table
 from .modes import swinging
 from .passage import Passed, passed
-from .plant import Errors, Loop, Plant, fly_cycles, moving_part_history
+from .plant import Errors, Loop, Plant, Thrusters, fly_cycles, moving_part_history
 from .sampling import axes_of, telemetry_of
 from .sensors import NOISE, STAR_TRACKER_PERIOD_S, Estimator, normal
 from .thrusters import (
@@ -34,6 +35,9 @@ from .thrusters import (
 from .write import write_flight
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
     from ...telemetry.telemetry import Telemetry
 
 __all__ = ["Flight", "Truth", "fly", "write_flight"]
@@ -79,53 +83,117 @@ class Flight:
     wheels: tuple[str, ...]
     seed: int
     ended: str
-    doubts: tuple[str, ...] = ()
+    doubts: Doubts = Doubts()
     met: Passed | None = None
 
 
-def fly(scenario, *, craft=None, seed: int | None = None, noise: str | None = None, progress=None, **changes) -> Flight:
-    """Fly a scenario, a shipped one by name, a TOML file, or a ``Scenario``.
+def fly(
+    scenario: str | Path | Scenario,
+    *,
+    craft: str | Path | Craft | None = None,
+    seed: int | None = None,
+    noise: str | None = None,
+    progress: Callable[[str], None] | None = None,
+    changes: dict | None = None,
+) -> Flight:
+    """Fly a scenario in the closed loop of plant, sensors, controller and actuators.
 
-    ``craft``: a Craft, or what ``load_craft`` takes, instead of the scenario's own; ``noise``: none, half,
-    nominal or double; ``changes``: values of the scenario, written as in its TOML
-    (``duration="60 s"``).  ``progress`` is called with a line of text now and then.
-    The same scenario and seed give the same numbers, bit for bit, on one machine and lock.
-    Raises BadInput for a scenario or craft that cannot be flown."""
-    if not isinstance(scenario, Scenario):
-        scenario = load_scenario(scenario)
-    if noise is not None:
-        changes["noise"] = noise
-    if seed is not None:
-        changes["seed"] = seed
-    if changes:
-        scenario = scenario.changed(**changes)
-    tell = progress or (lambda text: None)
+    The same scenario and seed give the same numbers, bit for bit, on one machine with the same package versions.
 
+    Parameters
+    ----------
+    scenario : str, Path or Scenario
+        A shipped scenario by name (``shipped_scenarios``), or a TOML file.
+    craft : str, Path or Craft, optional
+        The craft to fly in place of the scenario's own.
+    seed : int, optional
+        Another draw of the noise; the scenario's own unless given.
+    noise : str, optional
+        'none', 'half', 'nominal' or 'double', in place of the scenario's own.
+    progress : callable, optional
+        Called with a line of text before and after the flight.
+    changes : dict, optional
+        Values of the scenario to replace, written as in its TOML: ``{"duration": "60 s"}``.  Tables are merged key by key,
+        lists replaced (see ``Scenario.changed``).
+
+    Returns
+    -------
+    Flight
+        ``telemetry`` as the ground receives it, and ``truth`` at every control cycle: body axes, torques on the body.
+
+    Raises
+    ------
+    BadInput
+        If the scenario, a change or the craft cannot be flown, or the motion does not stay finite.
+    """
+    scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    own = {"seed": seed, "noise": noise}
+    changes = (changes or {}) | {name: value for name, value in own.items() if value is not None}
+    scenario = scenario.changed(**changes) if changes else scenario
     craft = craft if isinstance(craft, Craft) else load_craft(craft or scenario.craft)
     now = craft.at(scenario.epoch_ns)
     _check_flyable(scenario, now)
-    loop = wheel_loop(scenario, now)
     part = moving_part(scenario.cover, now) if scenario.cover else None
     met = None
     if scenario.flyby is not None:
         met = passed(scenario.flyby, now, -scenario.settle, scenario.duration)
-    plant = _plant(scenario, now, part, met)
-    if (scenario.settle + scenario.duration) / loop.period > MOST_CYCLES:
+    flown = _integrated(scenario, now, _plant(scenario, now, part, met), progress)
+
+    fired = None
+    if scenario.thrusters is not None:
+        fired = thruster_truth(
+            flown.rows, flown.columns, flown.thrusters, scenario, now.craft, flown.times, flown.period_s, flown.before
+        )
+    truth = _truth(flown, scenario, part, fired, met)
+    readings = _readings(flown, truth, now, scenario, part)
+    return Flight(
+        telemetry=telemetry_of(readings, scenario, flown.period_s, scenario.seed, scenario.name),
+        truth=truth,
+        scenario=scenario,
+        craft=craft,
+        inertia_kgm2=np.asarray(now.inertia_kgm2),
+        wheels=tuple(w.name for w in now.wheels),
+        seed=scenario.seed,
+        ended=flown.ended,
+        doubts=now.doubts + thrust_doubts(scenario, craft),
+        met=met,
+    )
+
+
+@dataclass(frozen=True)
+class _Flown:
+    """The integrated motion from the epoch on, as ``plant.fly_cycles`` recorded it."""
+
+    rows: np.ndarray  # (N, columns)
+    columns: _Columns
+    times: np.ndarray  # (N,) control instants
+    commanded_rate: np.ndarray  # (N, 3)
+    plant: Plant
+    thrusters: Thrusters
+    period_s: float
+    before: int  # control cycles flown before the epoch
+    ended: str
+
+
+def _integrated(scenario: Scenario, now: CraftAt, plant: Plant, progress) -> _Flown:
+    """The plant under its controllers, cycle by cycle.  Raises BadInput where the motion cannot be recorded."""
+    loop = wheel_loop(scenario, now)
+    whole_s = scenario.settle + scenario.duration
+    if whole_s / loop.period > MOST_CYCLES:
         raise BadInput(
-            f"{scenario.settle + scenario.duration:g} s are more than {MOST_CYCLES:,} control cycles of {loop.period:g} s",
+            f"{whole_s:g} s are more than {MOST_CYCLES:,} control cycles of {loop.period:g} s",
             remedy="Shorten duration and settle: everything true is kept for every cycle.",
         )
-    cycles = round(scenario.duration / loop.period) + 1
     before = int(np.ceil(scenario.settle / loop.period))
-    times = loop.period * np.arange(-before, cycles)
+    times = loop.period * np.arange(-before, round(scenario.duration / loop.period) + 1)
     q_c, w_c, alpha_c = commanded_motion(scenario.slews, times)
     errors = _errors(scenario, loop, len(times), len(now.wheels))
-    names = tuple(w.name for w in now.wheels)
     x = _start(scenario, now, plant, q_c[0])
     thrusters = thrusters_of(scenario, now, times, loop.period)
     record = np.zeros((len(times), len(x) + 18 + 3 * len(now.wheels) + 4 * len(thrusters.delay)))
-    tell(f"flying {scenario.name}: {scenario.settle + scenario.duration:g} s in {len(times)} control cycles")
-    off = coasting(scenario, names, times)
+    if progress is not None:
+        progress(f"flying {scenario.name}: {whole_s:g} s in {len(times)} control cycles")
+    off = coasting(scenario, tuple(w.name for w in now.wheels), times)
     flown, full = fly_cycles(plant, loop, errors, thrusters, off, q_c, w_c, alpha_c, times[0], x, record)
     if flown <= before:
         raise BadInput(
@@ -134,25 +202,17 @@ def fly(scenario, *, craft=None, seed: int | None = None, noise: str | None = No
         )
     if not np.isfinite(record[:flown]).all():
         raise BadInput(
-            "the simulated motion is not finite: the loop is unstable or the step too long",
+            "the simulated motion is not finite: the loop is unstable or the step is too long",
             remedy="Raise substeps, lower the delay, or check inertia, gains and torques.",
         )
-    rows, times = record[before:flown], times[before:flown]
+    times = times[before:flown]
     ended = f"reached {times[-1]:g} s"
     if full >= 0:
         ended = f"wheel {now.wheels[full].name} at its rate limit at {times[-1]:g} s"
-    tell(ended)
-
+    if progress is not None:
+        progress(ended)
     columns = _Columns(len(now.wheels), plant, len(thrusters.delay))
-    fired = None
-    if scenario.thrusters is not None:
-        fired = thruster_truth(rows, columns, thrusters, scenario, now.craft, times, loop.period, before)
-    truth = _truth(rows, times, columns, plant, now, scenario, part, fired, met)
-    command = (w_c[before:flown], q_c[before:flown])
-    readings = _readings(rows, columns, truth, command, now, scenario, part)
-    telemetry = telemetry_of(readings, scenario, loop.period, scenario.seed, scenario.name)
-    doubts = now.doubts + thrust_doubts(scenario, craft)
-    return Flight(telemetry, truth, scenario, craft, now.inertia_kgm2, names, scenario.seed, ended, doubts, met)
+    return _Flown(record[before:flown], columns, times, w_c[before:flown], plant, thrusters, loop.period, before, ended)
 
 
 def _check_flyable(scenario: Scenario, now: CraftAt) -> None:
@@ -227,6 +287,26 @@ def _errors(scenario: Scenario, loop: Loop, cycles: int, wheels: int) -> Errors:
 class _Columns:
     """Which columns of the record hold what (plant.fly_cycles)."""
 
+    attitude: slice
+    rate: slice
+    wheel_rate: slice
+    mode: slice
+    mode_rate: slice
+    ledger: slice
+    estimation_error: slice
+    attitude_error: slice
+    rate_estimate: slice
+    controller_rate_error: slice
+    control_torque: slice
+    motor_torque: slice
+    drag_estimate: slice
+    wheel_reading: slice
+    outside: slice
+    on: slice
+    thrust: slice
+    impulse: slice
+    chill: slice
+
     def __init__(self, n: int, plant: Plant, j: int):
         m = len(plant.mode_damping)
         widths = {"attitude": 4, "rate": 3, "wheel_rate": n, "mode": m, "mode_rate": m, "ledger": 4, "estimation_error": 3,
@@ -239,7 +319,8 @@ class _Columns:
             at += width
 
 
-def _truth(rows, times, columns, plant: Plant, now: CraftAt, scenario: Scenario, part, fired, met) -> Truth:
+def _truth(flown: _Flown, scenario: Scenario, part, fired, met) -> Truth:
+    rows, times, columns, plant = flown.rows, flown.times, flown.columns, flown.plant
     rate, wheel_rate = rows[:, columns.rate], rows[:, columns.wheel_rate]
     stored = wheel_rate * plant.spin_inertia @ plant.wheel_axes
     torque = np.zeros_like(rate)
@@ -277,11 +358,11 @@ def _truth(rows, times, columns, plant: Plant, now: CraftAt, scenario: Scenario,
     )
 
 
-def _readings(rows, columns, truth: Truth, command, now: CraftAt, scenario: Scenario, part) -> dict[str, np.ndarray]:
+def _readings(flown: _Flown, truth: Truth, now: CraftAt, scenario: Scenario, part) -> dict[str, np.ndarray]:
     """Every channel at every control instant, as the instruments and the flight software give it."""
     noise, seed = NOISE[scenario.noise], scenario.seed
     wheels = [w.name for w in now.wheels]
-    w_c, _ = command
+    rows, columns = flown.rows, flown.columns
     rate = rows[:, columns.rate_estimate]
     shape = (len(rows), 3)
     error = rows[:, columns.attitude_error] - normal(seed, "attitude error read-out", shape, noise.attitude_white_rad)
@@ -289,7 +370,7 @@ def _readings(rows, columns, truth: Truth, command, now: CraftAt, scenario: Scen
     readings = axes_of("wheel_rate", rows[:, columns.wheel_reading], wheels)
     readings |= axes_of("body_rate", rate, AXES)
     readings |= axes_of("attitude_error", error, AXES)
-    readings |= axes_of("rate_error", w_c - rate, AXES)
+    readings |= axes_of("rate_error", flown.commanded_rate - rate, AXES)
     readings |= axes_of("controller_rate_error", rows[:, columns.controller_rate_error], AXES)
     readings |= axes_of("quaternion", _turned(truth.attitude, estimate), QUATERNION)
     readings |= axes_of("control_torque", rows[:, columns.control_torque], AXES)

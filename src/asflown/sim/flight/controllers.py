@@ -1,4 +1,4 @@
-"""The wheel controller of 000 section IV as the flight computer runs it: gains and discrete filter."""
+"""The wheel controller of the cover paper's section IV as the flight computer runs it: gains and discrete filter."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ def passed(p: Passage, now: CraftAt, start_s: float, stop_s: float) -> Passed:
 
 
 def plume_torque(p: Plume, duration: float) -> tuple[np.ndarray, np.ndarray]:
-    """004's own: E3, Table 3, 0.5 x 2.1 x 14410^2 x 18.401 x 0.853 N m per kg/m3 (eq 22). (k,), (k,)"""
+    """The plume paper's own: E3, Table 3, 0.5 x 2.1 x 14410^2 x 18.401 x 0.853 N m per kg/m3 (eq 22). (k,), (k,)"""
     t, where = np.arange(0.0, duration + _STEP_S, _STEP_S), flyby_called(p.flyby)
     per_density = torque_per_density(2.1, where.speed_m_s, 18.401, 0.853)
     return t, p.sign * per_density * plume_density(published_jets(), where, t - p.closest_approach, power=p.exponent)

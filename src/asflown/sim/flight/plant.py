@@ -13,7 +13,7 @@ I holds the wheels as if they did not spin, and the moving part where it is; h_r
 part's momentum relative to the body.  Wheel and mode accelerations are eliminated exactly, which
 leaves a 3 x 3 system for w_dot.
 
-Thrusters push from outside.  Each is a delay and two first-order lags (001 section V), so its impulse over
+Thrusters push from outside.  Each is a delay and two first-order lags (Feldman & Lee, section V), so its impulse over
 any step is known exactly, and the step gets that impulse as a constant torque.
 """
 
@@ -344,8 +344,8 @@ def settle(thrust, towards, lag, duration):
 def impulses(thrusters, cycle, on, was_on, level, chill, thrust, start, stop, out):
     """Impulse (j,) of each thruster between two moments of a cycle, counted from its start; ``thrust`` moves on. [N s]
 
-    Until the order is felt the valve does what it was told a cycle ago, but one told to close holds its thrust, as 001
-    section V says.  A lone pulse of D then gives, with E = exp(-(D - delay) / rise),
+    Until the order is felt the valve does what it was told a cycle ago, but one told to close holds its thrust, as Feldman & Lee
+    (section V) say.  A lone pulse of D then gives, with E = exp(-(D - delay) / rise),
 
         J / F = D + fall - rise + (rise - delay - fall) E"""
     for k in range(len(thrust)):

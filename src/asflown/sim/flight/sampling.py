@@ -13,7 +13,7 @@ from ...telemetry.telemetry import Channel, Telemetry
 from .sensors import stream
 
 if TYPE_CHECKING:
-    from ..scenario import Scenario
+    from ..scenario import Sampling, Scenario
 
 
 def telemetry_of(
@@ -23,41 +23,51 @@ def telemetry_of(
 
     Sample instants are control instants.  Raises BadInput for an interval shorter than the cycle and
     for a gap in a channel that is not sent."""
-    sampling, epoch = scenario.telemetry, scenario.epoch_ns
+    _check_gaps(scenario.telemetry, readings)
     channels = {}
     for name, values in readings.items():
-        stem, member = kind_of(name).stem, kind_of(name).member
-        every = sampling.mechanism if member == "mechanism" else getattr(sampling, stem)
-        if every == 0:
-            continue
-        cycles = round(every / period_s)
-        if cycles < 1:
-            raise BadInput(
-                f"{stem} cannot be sampled every {every:g} s",
-                channel=name,
-                remedy=f"The control cycle is {period_s:g} s: samples are taken at its instants.",
-            )
-        phase = int(stream(seed, f"phase {stem}").integers(cycles)) if sampling.random_phases else 0
-        taken = np.arange(phase, len(values), cycles)
-        if sampling.dropout > 0:
-            taken = taken[stream(seed, f"dropout {name}").random(len(taken)) >= sampling.dropout]
-        for gap in sampling.gaps:
-            if gap.channel in ("*", name, stem):
-                taken = taken[(taken * period_s < gap.start) | (taken * period_s > gap.stop)]
-        if len(taken) == 0:
+        taken = _taken(name, len(values), scenario.telemetry, period_s, seed)
+        if not len(taken):
             continue
         sampled = values[taken]
-        count = sampling.count_size(stem)
+        count = scenario.telemetry.count_size(kind_of(name).stem)
         if count > 0:
             sampled = count * np.round(sampled / count)
         # integer nanoseconds of the cycle itself, so that a long flight keeps its instants exact
-        tai_ns = epoch + np.rint(taken * (period_s * NS)).astype(np.int64)
+        tai_ns = scenario.epoch_ns + np.rint(taken * (period_s * NS)).astype(np.int64)
         channels[name] = Channel(name, tai_ns, sampled, np.ones(len(taken), bool), kind_of(name).unit, count)
     if not channels:
         raise BadInput(
             "this flight sends no telemetry at all",
             remedy="Give a family under [telemetry] an interval, or a shorter one.",
         )
+    return Telemetry(channels, scenario.epoch_ns, dated=True, source=source)
+
+
+def _taken(name: str, cycles: int, sampling: Sampling, period_s: float, seed: int) -> np.ndarray:
+    """Control cycles at which a channel is sampled and reaches the ground; none for one that is not sent."""
+    stem, member = kind_of(name).stem, kind_of(name).member
+    every_s = sampling.mechanism if member == "mechanism" else getattr(sampling, stem)
+    if every_s == 0:
+        return np.empty(0, int)
+    every = round(every_s / period_s)
+    if every < 1:
+        raise BadInput(
+            f"{stem} cannot be sampled every {every_s:g} s",
+            channel=name,
+            remedy=f"The control cycle is {period_s:g} s: samples are taken at its instants.",
+        )
+    phase = int(stream(seed, f"phase {stem}").integers(every)) if sampling.random_phases else 0
+    taken = np.arange(phase, cycles, every)
+    if sampling.dropout > 0:
+        taken = taken[stream(seed, f"dropout {name}").random(len(taken)) >= sampling.dropout]
+    for gap in sampling.gaps:
+        if gap.channel in ("*", name, stem):
+            taken = taken[(taken * period_s < gap.start) | (taken * period_s > gap.stop)]
+    return taken
+
+
+def _check_gaps(sampling: Sampling, readings) -> None:
     for gap in sampling.gaps:
         if gap.channel != "*" and not any(gap.channel in (n, kind_of(n).stem) for n in readings):
             raise BadInput(
@@ -65,7 +75,6 @@ def telemetry_of(
                 channel=gap.channel,
                 remedy="Use '*' for all channels, a family such as wheel_rate, or a channel's name.",
             )
-    return Telemetry(channels, epoch, dated=True, source=source)
 
 
 def axes_of(stem: str, values: np.ndarray, members) -> dict[str, np.ndarray]:

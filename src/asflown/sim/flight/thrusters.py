@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...craft.model import STALE_NS
+from ...kit.doubts import Doubts, Kind, Severity
 from ...kit.errors import BadInput, some_of
 from ...kit.rotations import rotation
-from ...kit.timeline import NS, utc_label
+from ...kit.timeline import utc_label
 from ...telemetry.channels import AXES
 from ..scenario import CatalystBeds, Scenario, ThrusterUse
 from .plant import Thrusters
@@ -170,7 +172,7 @@ def thrusters_of(scenario: Scenario, now: CraftAt, times, period: float) -> Thru
 
 
 def arms(craft: Craft, use: ThrusterUse) -> np.ndarray:
-    """Torque about the centre of mass for one newton of each thruster, (j, 3). [m]   001 eq 16"""
+    """Torque about the centre of mass for one newton of each thruster, (j, 3). [m]   Feldman & Lee eq 16"""
     middle = craft.center_of_mass or use.center_of_mass
     if middle is None:
         raise BadInput(
@@ -215,7 +217,7 @@ def thruster_readings(truth: ThrusterTruth, scenario: Scenario, craft: Craft) ->
 
 
 def accelerometer_reading(truth: ThrusterTruth, scenario: Scenario, craft: Craft, times) -> dict[str, np.ndarray]:
-    """Whole counts of the velocity the thrusters give along its axis, and of its bias.  (001 Appendix D)
+    """Whole counts of the velocity the thrusters give along its axis, and of its bias.  (Feldman & Lee, Appendix D)
 
     It is taken to sit in the centre of mass: what the body's turning adds elsewhere is left out."""
     if craft.accelerometer is None:
@@ -230,16 +232,21 @@ def accelerometer_reading(truth: ThrusterTruth, scenario: Scenario, craft: Craft
     }
 
 
-def thrust_doubts(scenario: Scenario, craft: Craft) -> tuple[str, ...]:
+OLD_THRUST = Kind(
+    "sim.old-thrust", Severity.CAUTION,
+    "the thrust is that of {date}, the last one known: it has changed since with use or recharge",
+    "Give the scenario thrusters.thrust.",
+)  # fmt: skip
+
+
+def thrust_doubts(scenario: Scenario, craft: Craft) -> Doubts:
     """What to say of a thrust taken from long before the flight."""
     if scenario.thrusters is None or scenario.thrusters.thrust is not None:
-        return ()
+        return Doubts()
     last = max(h.date for h in craft.thrust_history)
-    if scenario.epoch_ns - last < 200 * 86_400 * NS:
-        return ()
-    return (
-        f"the thrust is that of {utc_label(last)[:10]}, the last one known: used up or topped up since, it is another",
-    )
+    if scenario.epoch_ns - last < STALE_NS:
+        return Doubts()
+    return Doubts([OLD_THRUST(date=utc_label(last)[:10])])
 
 
 def _so_far(what) -> np.ndarray:

@@ -85,7 +85,7 @@ def truth_record(flight) -> dict:
         "flyby": None if flight.met is None else flight.met.record(),
         "peaks": [{"time_s": t, "torque_Nm": T, "axis": a} for t, T, a in truth.peaks],
         "assumptions": list(scenario.assumptions),
-        "doubts": list(flight.doubts),
+        **flight.doubts.record(),
         "as_written": scenario.as_written,
         "versions": {"python": platform.python_version()}
         | {p: version(p) for p in ("asflown", "numpy", "scipy", "numba")},

@@ -1,8 +1,8 @@
 """Many actuations over years: a mechanism that ages, flown one by one."""
 
-from .flown import fly_mission
+from .flown import MissionRecord, fly_mission
 from .mission import Mission, is_mission, load_mission
 
 __all__ = [
-    "Mission", "fly_mission", "is_mission", "load_mission",
+    "Mission", "MissionRecord", "fly_mission", "is_mission", "load_mission",
 ]  # fmt: skip

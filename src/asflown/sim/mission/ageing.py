@@ -28,7 +28,7 @@ from ..flight import MovingPart, momentum_per_rate, moving_part
 if TYPE_CHECKING:
     from ..scenario import CoverMotion
 
-#: The first kind of motion lasts this long from motor-on (000 section V: minute 1.00 to 2.35). [s]
+#: The first kind of motion lasts this long from motor-on (cover paper, section V: minute 1.00 to 2.35). [s]
 BUILD_UP_S = 81.0
 #: Excursions nearer than this to a larger one, or standing out less than this share of the largest, are part of it.
 APART_S, STANDS_OUT = 5.0, 0.1
@@ -42,7 +42,7 @@ _ROUNDS, _CLOSE, _ENOUGH = 30, 5e-5, 2e-3
 
 @dataclass(frozen=True)
 class Figures:
-    """True figures of merit of a torque about the hinge, on the body, with their sign (000 section V)."""
+    """True figures of merit of a torque about the hinge, on the body, with their sign (cover paper, section V)."""
 
     impulse_Nms: float
     peak_positive_Nm: float

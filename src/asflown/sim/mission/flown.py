@@ -7,19 +7,25 @@ import platform
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...craft.load import load_craft
 from ...craft.model import Craft
+from ...kit.doubts import Doubt, Doubts, grouped
 from ...kit.errors import BadInput
 from ...kit.files import check_folder, write_text
+from ...kit.schema import Annotated, Doc, DoubtRecord, TypedDict
 from ...kit.timeline import utc_to_tai_ns
 from ...telemetry.tables import write_table
 from ..flight import fly, stream
 from ..scenario import CoverMotion, Scenario, load_scenario
 from .ageing import Figures, aged, figures_of
 from .mission import Actuation, Cold, Fault, Mission, load_mission
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 #: truth.csv of an event has a row this often, not one a control cycle as a flight's own. [s]
 TRUTH_EVERY_S = 0.5
@@ -39,29 +45,86 @@ class Planned:
     cold: bool
 
 
-def fly_mission(
-    mission, out: str | Path, *, craft=None, seed: int | None = None, noise: str | None = None, progress=None
-):
-    """Fly a mission, a shipped one by name, a TOML file, or a ``Mission``, and write it to the folder ``out``.
+class MissionRecord(TypedDict):
+    """What ``fly_mission`` returns and mission.json holds: what was flown, and what is true of it."""
 
-    Writes <event>/telemetry.csv and <event>/truth.csv (every half second) for each event flown, mission.json with the
-    truth, which is also returned, and last events.toml: where that stands, all the rest does.  ``craft``: a Craft, or
-    what ``load_craft`` takes, instead of the mission's.  The same mission and seed give the same files on one machine.
-    Raises BadInput for a mission that cannot be flown: before anything is written, unless a wheel reaches its limit."""
-    if not isinstance(mission, Mission):
-        mission = load_mission(mission)
-    changes = {k: v for k, v in {"seed": seed, "noise": noise}.items() if v is not None}
-    if changes:
-        mission = mission.changed(**changes)
+    mission: str
+    description: str
+    craft: str
+    seed: int
+    noise: str
+    law: Annotated[dict, Doc("figures of merit when ageing starts, and their change until it stops")]
+    fit: Annotated[dict, Doc("straight line through the true figures, by kind of actuation")]
+    scatter: dict[str, float]
+    cold: dict[str, float]
+    faults: list[dict]
+    flown: Annotated[int, Doc("actuations flown")]
+    listed: Annotated[int, Doc("actuations listed, flown or not")]
+    events: Annotated[list[dict], Doc("each actuation flown: true figures, the law's alone, draws, scenario, doubts")]
+    assumptions: list[str]
+    doubts: list[str]
+    doubts_detail: list[DoubtRecord]
+    as_written: dict
+    versions: dict[str, str]
+
+
+def fly_mission(
+    mission: str | Path | Mission,
+    out: str | Path,
+    *,
+    craft: str | Path | Craft | None = None,
+    seed: int | None = None,
+    noise: str | None = None,
+    progress: Callable[[str], None] | None = None,
+    changes: dict | None = None,
+) -> MissionRecord:
+    """Fly every actuation of a mission and write telemetry and truth into a folder.
+
+    Writes <event>/telemetry.csv and <event>/truth.csv (every half second) for each event flown, then mission.json with the
+    truth, and last events.toml: where that stands, all the rest does.  The same mission and seed give the same files on one
+    machine with the same package versions.
+
+    Parameters
+    ----------
+    mission : str, Path or Mission
+        A shipped mission by name (``cassini-mission``), or a TOML file.
+    out : str or Path
+        The folder; it is made where it is missing.
+    craft : str, Path or Craft, optional
+        The craft to fly in place of the mission's own.
+    seed : int, optional
+        Another draw of scatter and noise; the mission's own unless given.
+    noise : str, optional
+        'none', 'half', 'nominal' or 'double', in place of the mission's own.
+    progress : callable, optional
+        Called with a line of text now and then.
+    changes : dict, optional
+        Values of the mission to replace, written as in its TOML: ``{"scatter": {"impulse_percent": 0.0}}``.
+
+    Returns
+    -------
+    MissionRecord
+        The content of mission.json, a dict.  Torques and momenta are those on the body, with their sign.
+
+    Raises
+    ------
+    BadInput
+        If the mission cannot be flown: before anything is written, unless a wheel reaches its rate limit on the way.
+    """
+    mission = mission if isinstance(mission, Mission) else load_mission(mission)
+    own = {"seed": seed, "noise": noise}
+    changes = (changes or {}) | {name: value for name, value in own.items() if value is not None}
+    mission = mission.changed(**changes) if changes else mission
     craft = craft if isinstance(craft, Craft) else load_craft(craft or mission.craft)
-    tell = progress or (lambda text: None)
     folder = Path(out)
     check_folder(folder)
     planned = plan_mission(mission, craft)
-    tell(f"{mission.name}: {len(planned)} flights, {len(mission.events)} actuations in all")
+    if progress is not None:
+        progress(f"{mission.name}: {len(planned)} flights, {len(mission.events)} actuations in all")
 
     (folder / "events.toml").unlink(missing_ok=True)  # an old list must not stand beside new flights
-    records, doubts = [], []
+    records: list[dict] = []
+    doubts: list[Doubt] = []
     for number, p in enumerate(planned, start=1):
         flight = fly(p.scenario, craft=craft)
         if flight.truth.time_s[-1] < p.cover.motor_off:
@@ -70,10 +133,10 @@ def fly_mission(
         write_text(folder / p.event.name / "truth.csv", _thinned_truth(flight))
         write_table(flight.telemetry, folder / p.event.name / "telemetry.csv")
         records.append(_event_record(p, flight, true))
-        undated = [d.replace(f" on {p.event.date[:10]}", "") for d in flight.doubts]  # the same of many events, once
-        doubts += [d for d in undated if d not in doubts]
-        tell(f"{number:3d} of {len(planned)}  {p.event.name}: impulse {true.impulse_Nms:+.3f} N m s, "
-             f"excursions {1e3 * true.peak_positive_Nm:+.1f} and {1e3 * true.peak_negative_Nm:+.1f} mN m")  # fmt: skip
+        doubts += flight.doubts
+        if progress is not None:
+            progress(f"{number:3d} of {len(planned)}  {p.event.name}: impulse {true.impulse_Nms:+.3f} N m s, "
+                     f"excursions {1e3 * true.peak_positive_Nm:+.1f} and {1e3 * true.peak_negative_Nm:+.1f} mN m")  # fmt: skip
     record = _mission_record(mission, craft, records, doubts)
     write_text(folder / "mission.json", json.dumps(record, indent=1, allow_nan=False) + "\n")
     write_text(folder / "events.toml", _event_list(mission, planned))
@@ -89,7 +152,7 @@ def plan_mission(mission: Mission, craft: Craft) -> list[Planned]:
     for event in mission.flown:
         rest, now = rests[event.name], craft.at(event.tai_ns)
         cold = rest is not None and rest >= mission.cold.after / 86_400
-        line, factors = line_at(mission, event), _factors(mission, event, cold)
+        line, factors = line_at(mission, event), _factors(mission, event, cold=cold)
         # all are drawn always, in this order, by the event's name: no setting and no other event changes a draw
         random = stream(mission.seed, f"event {event.name}")
         seed = int(random.integers(2**31))
@@ -138,7 +201,7 @@ def trend_of(records) -> dict:
     return found
 
 
-def _factors(mission: Mission, event: Actuation, cold: bool) -> dict[str, float]:
+def _factors(mission: Mission, event: Actuation, *, cold: bool) -> dict[str, float]:
     until_now = [e.name for e in mission.events if e.tai_ns <= event.tai_ns]
     struck = [f for f in mission.faults if f.kind in (None, event.kind) and f.since in until_now]
     active: list[Fault | Cold] = [*struck, *([mission.cold] if cold else [])]
@@ -222,12 +285,13 @@ def _event_record(p: Planned, flight, true: Figures) -> dict:
         "seed": flight.seed,
         "ended": flight.ended,
         "as_written": p.scenario.as_written,
-        "doubts": list(flight.doubts),
+        **flight.doubts.record(),
     }
 
 
-def _mission_record(mission: Mission, craft: Craft, records, doubts) -> dict:
+def _mission_record(mission: Mission, craft: Craft, records, doubts) -> MissionRecord:
     law = mission.ageing
+    said = Doubts(d for d, _ in grouped(doubts))  # the same of many events once
     start = {
         kind: {
             "angular_impulse_Nms": m.impulse,
@@ -260,7 +324,8 @@ def _mission_record(mission: Mission, craft: Craft, records, doubts) -> dict:
         "listed": len(mission.events),
         "events": records,
         "assumptions": list(mission.assumptions),
-        "doubts": doubts,
+        "doubts": said.sentences(),
+        "doubts_detail": [d.record() for d in said],
         "as_written": mission.as_written,
         "versions": {"python": platform.python_version()}
         | {p: version(p) for p in ("asflown", "numpy", "scipy", "numba")},

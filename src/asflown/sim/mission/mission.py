@@ -89,7 +89,7 @@ class Scatter(Part):
 
 
 class Cold(Part):
-    """What a long rest does to the figures of the next actuation."""
+    """What a long rest does to the figures of the next actuation; ``after``: the paper's cold start, as ``trends.COLD_DAYS``."""
 
     after: Second = Field(default=200 * 86_400.0, gt=0)
     impulse_factor: Factor = 1.0

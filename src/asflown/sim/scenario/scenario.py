@@ -77,26 +77,32 @@ class Scenario(Plan):
     def _with_thrusters(self):
         if self.thrusters is None and (self.thruster_faults or self.telemetry.accelerometer_count):
             raise ValueError("thruster_faults and accelerometer_count are of a flight with [thrusters]")
-        if self.flyby and self.flyby.gravity_gradient and self.slews:
-            raise ValueError("a flyby with gravity_gradient is flown at one attitude: no slews")
         if (self.wheel_biases or self.burns) and not (self.thrusters and self.thrusters.control):
             raise ValueError("wheel_biases and burns need [thrusters] that hold the attitude")
         if (self.thruster_control or self.branch_swaps) and self.thrusters is None:
             raise ValueError("thruster_control and branch_swaps are of a flight with [thrusters]")
-        if self.thruster_control:
-            if self.thrusters is not None and not self.thrusters.control:
-                raise ValueError("thrusters with control = false never hold the attitude: leave out thruster_control")
-            spans = [(c.start, c.stop) for c in self.thruster_control]
-            for what, start, stop in (
-                *(("a wheel bias", b.start, b.stop) for b in self.wheel_biases),
-                *(("a burn", b.start, b.start) for b in self.burns),
-            ):
-                if not any(a <= start and stop <= b for a, b in spans):
-                    raise ValueError(f"{what} ({start:g} to {stop:g} s) lies outside thruster_control")
-        if any(b.start < a.start for a, b in pairwise(self.branch_swaps)):
-            raise ValueError("branch_swaps: in order of their start")
-        if any(b.start < a.start for a, b in pairwise(self.burns)):
-            raise ValueError("burns: in order of their start")
+        if self.thruster_control and self.thrusters is not None and not self.thrusters.control:
+            raise ValueError("thrusters with control = false never hold the attitude: leave out thruster_control")
+        return self
+
+    @model_validator(mode="after")
+    def _within_thruster_control(self):
+        if not self.thruster_control:
+            return self
+        needed = [("a wheel bias", b.start, b.stop) for b in self.wheel_biases]
+        needed += [("a burn", b.start, b.start) for b in self.burns]
+        for what, start, stop in needed:
+            if not any(c.start <= start and stop <= c.stop for c in self.thruster_control):
+                raise ValueError(f"{what} ({start:g} to {stop:g} s) lies outside thruster_control")
+        return self
+
+    @model_validator(mode="after")
+    def _flown_in_order(self):
+        if self.flyby and self.flyby.gravity_gradient and self.slews:
+            raise ValueError("a flyby with gravity_gradient is flown at one attitude: no slews")
+        for name in ("branch_swaps", "burns"):
+            if any(b.start < a.start for a, b in pairwise(getattr(self, name))):
+                raise ValueError(f"{name}: in order of their start")
         return self
 
     def known_mass(self, who: str) -> float:

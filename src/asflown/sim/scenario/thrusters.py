@@ -13,7 +13,7 @@ from .units import AngleVector, Kelvin
 class CatalystBeds(Part):
     """Rise and fall that follow the beds' warmth: cold at the start, warmer with every second of firing.
 
-    001 section V: 15 to 25 ms and 40 to 90 ms; the beds' own time constants are assumed."""
+    Feldman & Lee section V: 15 to 25 ms and 40 to 90 ms; the beds' own time constants are assumed."""
 
     hot_rise: Second = Field(default=0.015, ge=0)
     hot_fall: Second = Field(default=0.040, ge=0)
@@ -29,7 +29,7 @@ class CatalystBeds(Part):
 class ThrusterUse(Part):
     """The craft's thrusters, holding the attitude unless ``control`` is false.
 
-    ``branch``: the one whose valves open, taken to sit where the craft's do (001 gives the places of branch A alone, 002 calls
+    ``branch``: the one whose valves open, taken to sit where the craft's do (Feldman & Lee give the places of branch A alone, Wagner calls
     the two identical); ``counted_branch``: the one whose on-times reach the ground, where it is not the one that opens."""
 
     control: bool = True
@@ -37,7 +37,7 @@ class ThrusterUse(Part):
     counted_branch: str | None = None  # whichever opens
     thrust: Newton | None = Field(default=None, gt=0)  # the craft's own on the date
     center_of_mass: MetreVector | None = None  # where the craft's file has none
-    deadband: AngleVector = (2e-3, 2e-3, 2e-3)  # 001 section V
+    deadband: AngleVector = (2e-3, 2e-3, 2e-3)  # Feldman & Lee section V
     rise: Second | None = Field(default=None, ge=0)  # the craft's own
     fall: Second | None = Field(default=None, ge=0)
     pulse_scatter: float = Field(default=0.0, ge=0, lt=0.3)  # one sigma of a pulse's thrust, relative
@@ -84,7 +84,7 @@ class ThrusterFault(Part):
 class Burn(Part):
     """A change of velocity by the thrusters that burn, the others and their off-pulses holding the attitude.
 
-    It is over when on-time times ``thrust`` over mass, as the flight software reckons, reaches ``delta_v`` (001 section V)."""
+    It is over when on-time times ``thrust`` over mass, as the flight software reckons, reaches ``delta_v`` (Feldman & Lee, section V)."""
 
     start: Second
     delta_v: MetrePerSecond = Field(gt=0)

@@ -14,7 +14,7 @@ from .units import TorqueVector, _series
 
 
 class Triangles(Part):
-    """Repeated triangular pulses about one body axis, alternating in sign (000 section VI)."""
+    """Repeated triangular pulses about one body axis, alternating in sign (cover paper, section VI)."""
 
     shape: Literal["triangles"]
     axis: Literal["x", "y", "z"]
@@ -25,7 +25,7 @@ class Triangles(Part):
 
 
 class Constant(Part):
-    """A constant torque in body axes, such as 001 Appendix A's non-gravitational one."""
+    """A constant torque in body axes, such as Feldman & Lee's Appendix A's non-gravitational one."""
 
     shape: Literal["constant"]
     torque: TorqueVector
@@ -47,7 +47,7 @@ class Table(Part):
         if (self.file is None) == all(v is None for v in inline):
             raise ValueError("give either file, or axis, times and torques")
         if self.file is None:
-            if any(v is None for v in inline) or len(self.times) != len(self.torques):
+            if self.times is None or self.torques is None or self.axis is None or len(self.times) != len(self.torques):
                 raise ValueError("axis, times and torques belong together, as many times as torques")
             if len(self.times) < 2 or min(np.diff(self.times)) <= 0:
                 raise ValueError("times must increase, and there must be two or more")
@@ -55,7 +55,7 @@ class Table(Part):
 
 
 class Plume(Part):
-    """Drag torque of E3's plume about one axis, with 004's own area and arm; a ``Passage`` has more."""
+    """Drag torque of E3's plume about one axis, with the plume paper's own area and arm; a ``Passage`` has more."""
 
     shape: Literal["plume"]
     flyby: Literal["enceladus-3"] = "enceladus-3"
@@ -66,7 +66,7 @@ class Plume(Part):
 
 
 class Passage(Part):
-    """A straight flyby through gas: of jets, or where the body has one of an atmosphere (004 eqs 19-27).
+    """A straight flyby through gas: of jets, or where the body has one of an atmosphere (plume paper, eqs 19-27).
 
     Constants are those of ``dynamics.flyby`` unless given; the craft holds its attitude, in which ``arm`` is u x (r_CP - r_CM)."""
 

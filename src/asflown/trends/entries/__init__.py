@@ -1,4 +1,4 @@
-"""What is kept of one event: figures of merit from telemetry and from results."""
+"""Entries of one event: figures of merit from telemetry and from results."""
 
 from .actuation import BASES, analyse
 from .events import find_events, is_event_list, load_events

@@ -1,4 +1,4 @@
-"""One actuation, from its telemetry to what is kept of it."""
+"""One actuation, from its telemetry to its entry."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...estimate.torque import TorqueResult, disturbance_torque
+from ...estimate.torque import TorqueResult, torque
+from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.ensemble import spread
 from ...kit.errors import BadInput, some_of
 from ...kit.timeline import NS, utc_label
@@ -27,14 +28,26 @@ BASES = {
     "momentum, printed": ("momentum", "printed"),
     "transfer, printed": ("transfer", "printed"),
 }
-#: Devices' channels kept beside the torque (000 Fig 9).
+#: Devices' channels kept with the torque (cover paper Fig 9).
 DEVICES = ("motor_current", "cover_angle", "motor_temperature")
-#: A check figure this many sigma from zero is doubted.
+#: A check figure this many sigma from zero raises a doubt.
 _OFF_ZERO = 3.0
-#: A hinge this near to a body axis needs that axis alone.
+#: A hinge within this angle of a body axis needs that axis alone.
 _ALONG = 1e-6
 #: A torque shows the motor's start where it is this many sigma from zero.
 _ONSET = 5.0
+
+
+START_UNSURE = Kind(
+    "trends.start-unsure", Severity.CAUTION,
+    "the motor's start is not in the event list; it is known to {sigma_s:.2g} s (1 sigma)",
+    "List the event with its motor_on time.",
+)  # fmt: skip
+NOT_ZERO = Kind(
+    "trends.not-zero", Severity.SUSPECT,
+    "{figure} is {value:+.2g} ± {sigma:.1g} {unit} but should be zero: an external torque acts, or the inertia is wrong",
+    "Check the inertia on that date, and other torques in the record.",
+)  # fmt: skip
 
 
 def analyse(event: Event, craft: Craft, telemetry: Telemetry | None = None) -> Entry:
@@ -56,7 +69,7 @@ def analyse(event: Event, craft: Craft, telemetry: Telemetry | None = None) -> E
         )  # fmt: skip
     results = {basis: _torque(tlm, craft, mechanism, *how) for basis, how in BASES.items()}
     event = _started(event, results["fused"], mechanism)
-    doubts = list(results["fused"].doubts)
+    doubts: list[Doubt | None] = list(results["fused"].doubts)
     torques = {basis: _about_hinge(r, mechanism, event) for basis, r in results.items()}
     values: list[Value] = []
     for figure in FIGURES.values():
@@ -65,23 +78,20 @@ def analyse(event: Event, craft: Craft, telemetry: Telemetry | None = None) -> E
             value, doubt = measure(figure, subject, basis)
             values.append(value)
             if basis in BEST:
-                doubts += [f"{figure.name}: {doubt}"] if doubt else []
-                doubts += _check_doubts(figure, value)
+                doubts += [doubt, _check_doubt(figure, value)]
     if event.motor_on_sigma_s:
-        doubts.append(
-            f"the motor's start is known to {event.motor_on_sigma_s:.2g} s (1 sigma): it is not in the event list"
-        )
+        doubts.append(START_UNSURE(sigma_s=event.motor_on_sigma_s))
     date = event.date or (utc_label(tlm.epoch_ns + round(event.motor_on_s * NS)) if tlm.dated else None)
     if date is None:
         raise BadInput(
-            f"event {event.id!r} has no date, nor has its telemetry",
+            f"neither event {event.id!r} nor its telemetry has a date",
             file=tlm.source,
             remedy="Give its date in the list.",
         )
     settings = results["fused"].settings
     return Entry(
         craft.name, event.id, event.kind, date, event.motor, event.note, tuple(values),
-        tuple(_curves(tlm, event, torques, mechanism)), tuple(dict.fromkeys(doubts)),
+        tuple(_curves(tlm, event, torques, mechanism)), Doubts(doubts),
         {"inputs": [{"file": tlm.source, "sha256": tlm.sha256}],
          "inertia": {k: settings[k] for k in settings if "inertia" in k},
          "fused": {k: settings[k] for k in ("prior", "loop", "seed") if k in settings},
@@ -91,7 +101,7 @@ def analyse(event: Event, craft: Craft, telemetry: Telemetry | None = None) -> E
 
 
 def torque_about_hinge(tlm: Telemetry, craft: Craft, event: Event, basis: str = "fused") -> Torque:
-    """The torque that the event's figures are taken from."""
+    """The torque from which the event's figures are computed."""
     mechanism = _mechanism(craft, event, tlm)
     return _about_hinge(_torque(tlm, craft, mechanism, *BASES[basis]), mechanism, event)
 
@@ -100,14 +110,14 @@ def _mechanism(craft: Craft, event: Event, tlm: Telemetry) -> Mechanism:
     names = [m.name for m in craft.mechanisms]
     if not names:
         raise BadInput(
-            f"the craft {craft.name} has no mechanism", remedy="Describe it: [[mechanisms]] in the craft file."
+            f"the craft {craft.name} has no mechanism", remedy="Add it under [[mechanisms]] in the craft file."
         )
     if len(names) == 1:
         return craft.mechanisms[0]
     moved = [n for n in names if f"cover_angle_{n}" in tlm]
     if len(moved) != 1:
         raise BadInput(
-            f"event {event.id!r}: which of the mechanisms {some_of(names)} moves is not clear from the telemetry",
+            f"event {event.id!r}: the telemetry does not show which of the mechanisms {some_of(names)} moves",
             file=tlm.source, channel="cover_angle", remedy="Name the channel cover_angle_<MECHANISM>.",
         )  # fmt: skip
     return craft.mechanism(moved[0])
@@ -122,9 +132,7 @@ def _hinge(mechanism: Mechanism) -> tuple[np.ndarray, str]:
 
 
 def _torque(tlm: Telemetry, craft: Craft, mechanism: Mechanism, method: str, variant: str) -> TorqueResult:
-    return disturbance_torque(
-        tlm, craft, method=method, variant=variant, axis=_hinge(mechanism)[1], moving=mechanism.name
-    )
+    return torque(tlm, craft, method=method, variant=variant, axis=_hinge(mechanism)[1], moving=mechanism.name)
 
 
 def _about_hinge(result: TorqueResult, mechanism: Mechanism, event: Event) -> Torque:
@@ -140,7 +148,7 @@ def _about_hinge(result: TorqueResult, mechanism: Mechanism, event: Event) -> To
 
 
 def _started(event: Event, result: TorqueResult, mechanism: Mechanism) -> Event:
-    """The event with the motor's start read off the torque's onset, where it is known no better than by sampling."""
+    """The event with the motor's start taken from the torque's onset, where it is known only to a sampling interval."""
     if not event.motor_on_sigma_s:
         return event
     torque = _about_hinge(result, mechanism, event)
@@ -153,13 +161,10 @@ def _started(event: Event, result: TorqueResult, mechanism: Mechanism) -> Event:
     return replace(event, motor_on_s=event.motor_on_s + float(torque.drawn_time_s[seen[0]]), motor_on_sigma_s=2.0)
 
 
-def _check_doubts(figure, value: Value) -> list[str]:
+def _check_doubt(figure, value: Value) -> Doubt | None:
     if not figure.is_check or value.value is None or not value.sigma or abs(value.value) <= _OFF_ZERO * value.sigma:
-        return []
-    return [
-        f"{figure.name} is {value.value:+.2g} +- {value.sigma:.1g} {value.unit} and should be zero: "
-        "something acted from outside, or the inertia is wrong"
-    ]
+        return None
+    return NOT_ZERO(figure=figure.name, value=value.value, sigma=value.sigma, unit=value.unit)
 
 
 def _curves(tlm: Telemetry, event: Event, torques: dict[str, Torque], mechanism: Mechanism):

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 #: A motor counts as running above this share of its largest current, and as stalled above the middle of the two levels.
 _RUNNING = 0.3
-#: A rise of the running current to a stall: at least by this share.
+#: Smallest relative rise of the running current to a stall.
 _STALL_RISE = 0.15
 #: Span kept of a record around a found actuation. [s]
 _MARGIN_S = 60.0
@@ -76,7 +76,7 @@ def load_events(path: str | Path) -> list[Event]:
     """Events of a list, TOML ([[event]]) or CSV, in order of the file.
 
     Raises BadInput for an unreadable list, unknown keys, a repeated id, an event with neither file nor date, times
-    out of order, and files that are not there: nothing is analysed of a list with a fault."""
+    out of order, and files that do not exist: a list with an error is not analysed at all."""
     path = Path(path)
     source = read_bytes(path, "event list", "Give an event list (TOML or CSV). " + _REMEDY)
     table = {"event": _csv_rows(source, path)} if path.suffix.lower() == ".csv" else toml_table(source, path)
@@ -84,7 +84,7 @@ def load_events(path: str | Path) -> list[Event]:
     seen: set[str] = set()
     for row in rows:
         if row.id in seen:
-            raise BadInput(f"two events are called {row.id!r}", file=path, remedy="Give every event an id of its own.")
+            raise BadInput(f"two events have the id {row.id!r}", file=path, remedy="Give every event a unique id.")
         seen.add(row.id)
     return [_checked(row, path) for row in rows]
 
@@ -110,7 +110,9 @@ def _csv_rows(source: bytes, path: Path) -> list[dict]:
     rows = []
     for number, raw in enumerate(csv.DictReader(io.StringIO("\n".join(lines))), start=2):
         if None in raw or None in raw.values():
-            raise BadInput("this row does not have as many cells as the header", file=path, line=number, remedy=_REMEDY)
+            raise BadInput(
+                "this row and the header differ in the number of cells", file=path, line=number, remedy=_REMEDY
+            )
         row: dict = {k.strip(): v.strip() for k, v in raw.items() if v.strip() != ""}
         for name in ("motor_on_s", "motor_off_s", "start_s", "stop_s"):
             if name in row:
@@ -137,17 +139,17 @@ def _checked(row: _Row, path: Path) -> Event:
     file = None
     if row.file is None:
         if date is None:
-            raise wrong("without a file it needs a date")
+            raise wrong("an event without a file needs a date")
     else:
         file = path.parent / row.file
         if not file.is_file():
-            raise wrong(f"there is no file {row.file} beside the list")
+            raise wrong(f"the file {row.file} does not exist in the folder of the list")
         if row.motor_on_s is None or row.motor_off_s is None:
-            raise wrong("with a file it needs motor_on_s and motor_off_s")
+            raise wrong("an event with a file needs motor_on_s and motor_off_s")
         if row.motor_on_s >= row.motor_off_s:
-            raise wrong("the motor is switched off before it is on")
+            raise wrong("motor_off_s is before motor_on_s")
     if row.start_s is not None and row.stop_s is not None and not row.start_s < row.stop_s:
-        raise wrong("its span ends before it starts")
+        raise wrong("stop_s is before start_s")
     on, off = (math.nan if t is None else t for t in (row.motor_on_s, row.motor_off_s))
     return Event(row.id, row.kind, date, file, on, off, row.start_s, row.stop_s, row.motor, row.note)
 
@@ -155,8 +157,8 @@ def _checked(row: _Row, path: Path) -> Event:
 def find_events(telemetry: Telemetry, prefix: str = "") -> list[Event]:
     """Actuations of a mechanism in a record, from its motor's current and its angle.
 
-    The current is sampled seldom: the motor came on between two samples, and the middle is taken with the sigma
-    of not knowing better.  Raises BadInput where there is no motor current, or the motor never runs."""
+    The current is sampled seldom: the motor came on between two samples, and the middle is used, with the sigma
+    of a uniform distribution between them.  Raises BadInput where there is no motor current, or the motor never runs."""
     current = _one_of(telemetry, "motor_current")
     angle = _one_of(telemetry, "cover_angle")
     c, t = current.values, telemetry.seconds(current.tai_ns)
@@ -166,7 +168,7 @@ def find_events(telemetry: Telemetry, prefix: str = "") -> list[Event]:
     events = []
     for first, end in zip(edges[::2], edges[1::2], strict=True):
         if first == 0 or end == len(t):
-            continue  # the record does not hold it whole
+            continue  # the record does not contain it completely
         before, after = float(t[first - 1]), float(t[first])
         off = 0.5 * float(t[end - 1] + t[end])
         moved = np.interp([before, float(t[end])], telemetry.seconds(angle.tai_ns), angle.values)
@@ -180,7 +182,7 @@ def find_events(telemetry: Telemetry, prefix: str = "") -> list[Event]:
         ))  # fmt: skip
     if not events:
         raise BadInput(
-            "no whole actuation is in this record: the motor's current does not rise and fall again",
+            "the record contains no complete actuation: the motor's current does not rise and fall again",
             file=telemetry.source, channel=current.name, remedy="List the events instead. " + _REMEDY,
         )  # fmt: skip
     return events
@@ -190,8 +192,8 @@ def stall(telemetry: Telemetry, event: Event) -> tuple[float, float] | None:
     """When the motor stalled, seconds after it came on, and sigma; None where the current shows no jump.
 
     A running motor that is stopped by its end stop draws more: the time lies between the two samples of the jump,
-    and is known no better than that (000 section III: 64 s apart).  Sigma is half the interval: events sampled at the
-    same phase err together, so that neighbours may differ by a whole one for nothing."""
+    and is known only to that interval (cover paper section III: 64 s).  Sigma is half the interval: events sampled at the
+    same phase have a common error, so that neighbours may differ by a whole interval by chance."""
     try:
         current = _one_of(telemetry, "motor_current")
     except BadInput:
@@ -212,9 +214,9 @@ def _one_of(telemetry: Telemetry, stem: str) -> Channel:
     """The only channel of a family.  Raises BadInput where there is none, or several."""
     found = [c for c in telemetry.channels.values() if c.kind.stem == stem]
     if len(found) != 1:
-        what = "is needed and is not in the telemetry" if not found else f"stands there {len(found)} times"
+        what = "is required but is not in the telemetry" if not found else f"occurs {len(found)} times"
         raise BadInput(
             f"the channel {stem} {what}", file=telemetry.source, channel=stem,
-            remedy=f"The telemetry holds: {some_of(telemetry.channels)}.",
+            remedy=f"The telemetry contains: {some_of(telemetry.channels)}.",
         )  # fmt: skip
     return found[0].usable

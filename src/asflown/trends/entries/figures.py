@@ -1,6 +1,6 @@
-"""Figures of merit of an actuation, each declared in a few lines; the rest is done for it.
+"""Figures of merit of an actuation, each declared in a few lines.
 
-A figure is a function of what one actuation looks like; its docstring says what it is.  One of the torque is
+A figure is a function of one actuation; its docstring is its description.  One of the torque is
 computed on every basis (fused with its sigma, and both printed methods), one of telemetry once::
 
     @figure_of_merit("N m s")
@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import find_peaks
 
+from ...kit.doubts import Kind, Severity
 from ...kit.ensemble import spread
 from ...kit.errors import BadInput
 from ...kit.plain import finite
@@ -31,13 +32,14 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ...craft.model import Mechanism
+    from ...kit.doubts import Doubt
     from ...telemetry.telemetry import Telemetry
 
-#: The first kind of motion lasts from the motor's start to minute 1.35 after it (000 section V: 1.00 to 2.35). [s]
+#: The first kind of motion lasts from the motor's start to minute 1.35 after it (cover paper section V: 1.00 to 2.35). [s]
 FIRST_PHASE_S = 81.0
 #: Excursions nearer than this to a larger one, or standing out less than this share of the largest, are part of it.
 _APART_S, _STANDS_OUT = 5.0, 0.1
-#: A mechanism is where it should be within this much: twice the potentiometer's usual step. [rad]
+#: Tolerance of a mechanism's end angle: twice the potentiometer's usual step. [rad]
 END_WITHIN = np.radians(1.0)
 
 
@@ -55,7 +57,9 @@ class Torque:
         """Angular impulse between two times from the motor's start; unknown beyond the record. [N m s]"""
         step = float(self.time_s[1] - self.time_s[0])
         if start_s < self.time_s[0] - step or stop_s > self.time_s[-1] + step:
-            return Measured(None, None, f"the record does not hold {start_s:g} to {stop_s:g} s after the motor's start")
+            return Measured(
+                None, None, f"the record does not cover {start_s:g} to {stop_s:g} s after the motor's start"
+            )
         value = float(_area(self.time_s, self.mean_Nm, start_s, stop_s))
         if not len(self.drawn_Nm):
             return Measured(value)
@@ -64,7 +68,7 @@ class Torque:
         return Measured(value, float(np.hypot(own, (ends[1] - ends[0]) * self.start_sigma_s)))
 
     def momentum(self) -> tuple[np.ndarray, np.ndarray]:
-        """Momentum given to the body since the motor's start, and drawn ones, at ``time_s`` and ``drawn_time_s``. [N m s]"""
+        """Momentum transferred to the body since the motor's start, and drawn ones, at ``time_s`` and ``drawn_time_s``. [N m s]"""
         own = _cumulated(self.time_s, self.mean_Nm)
         return own, _cumulated(self.drawn_time_s, self.drawn_Nm) if len(self.drawn_Nm) else self.drawn_Nm
 
@@ -83,7 +87,7 @@ class Torque:
     def height(self, times_s) -> Measured:
         """Mean torque at these times, of the excursions there. [N m]
 
-        Not each draw's own extreme near them: drawn torques are rougher than a mechanism's, and their extremes 10 %
+        The extremes of each draw are not used: drawn torques are rougher than a mechanism's, and their extremes are 10 %
         too high (studies/peak_figures.py)."""
         value = float(np.mean(np.interp(times_s, self.time_s, self.mean_Nm)))
         return Measured(value, self.spread_at(self.drawn_Nm, times_s))
@@ -98,11 +102,11 @@ class Torque:
 
 @dataclass(frozen=True)
 class Measured:
-    """A value, its sigma where there is one, and what there is to doubt."""
+    """A value, its sigma where there is one, and its doubt where there is one: a ``Doubt``, or a sentence."""
 
     value: float | None
     sigma: float | None = None
-    doubt: str = ""
+    doubt: Doubt | str | None = None
 
 
 @dataclass(frozen=True)
@@ -135,7 +139,7 @@ class Actuation:
         return stall(self.telemetry, self.event)
 
     def level(self, stem: str, start_s: float, stop_s: float) -> Measured:
-        """Median of a channel between two times, and the standard error of that."""
+        """Median of a channel between two times, and its standard error."""
         found = self.samples(stem)
         if found is None:
             return Measured(None)
@@ -148,7 +152,7 @@ class Actuation:
 
 @dataclass(frozen=True)
 class FigureOfMerit:
-    """One declared figure: ``of`` a Torque or an Actuation; ``judged`` for trend and watch; ``is_check``: zero if all is well."""
+    """One declared figure: ``of`` a Torque or an Actuation; ``judged`` for trend and watch; ``is_check``: should be zero."""
 
     name: str
     unit: str
@@ -163,10 +167,29 @@ FIGURES: dict[str, FigureOfMerit] = {}
 
 
 def figure_of_merit(unit: str, *, judged: bool = True, is_check: bool = False):
-    """Declare the function below as a figure of merit, in that SI unit, under its own name.
+    """Decorator: declare a function as a figure of merit under its own name.
 
-    Its one argument, called ``torque`` or ``actuation``, says what it is of; it returns a Measured, or None
-    where it cannot be computed.  Raises TypeError for any other signature or without a docstring."""
+    Parameters
+    ----------
+    unit : str
+        SI unit of its value, as in 'N m s'; '' where it has none.
+    judged : bool
+        Whether trend and watch test it.
+    is_check : bool
+        Whether it should be zero; it is doubted where it is not.
+
+    Returns
+    -------
+    callable
+        The decorator.  The function has one argument, ``torque`` (a Torque; computed on every basis) or ``actuation``
+        (an Actuation), and returns a Measured, or None where the figure cannot be computed.  Its docstring is the
+        figure's description.
+
+    Raises
+    ------
+    TypeError
+        For any other signature, and without a docstring.
+    """
 
     def declare(compute):
         names = list(inspect.signature(compute).parameters)
@@ -180,11 +203,13 @@ def figure_of_merit(unit: str, *, judged: bool = True, is_check: bool = False):
 
 
 def load_figures(path: str | Path) -> None:
-    """Declare the figures of a user's Python file beside the shipped ones.
+    """Declare the figures of a user's Python file in addition to the shipped ones.
 
-    Raises BadInput where the file is not there or does not run."""
+    Raises BadInput where the file does not exist or does not run."""
     if not Path(path).is_file():
-        raise BadInput("there is no such file of figures", file=path, remedy="Give a Python file; see docs/trends.md.")
+        raise BadInput(
+            "this file of figures does not exist", file=path, remedy="Give a Python file; see docs/trends.md."
+        )
     try:
         runpy.run_path(str(path))
     except Exception as why:
@@ -193,40 +218,54 @@ def load_figures(path: str | Path) -> None:
         ) from why
 
 
-def measure(figure: FigureOfMerit, of, basis: str) -> tuple[Value, str]:
-    """One figure on one basis, and its doubt; unknown where it has no answer."""
+OF_FIGURE = Kind("trends.figure", Severity.CAUTION, "{figure}: {sentence}")  # sentence of a user's figure
+OTHER_END = Kind(
+    "trends.end-angle", Severity.SUSPECT,
+    "the {mechanism} ends at {angle_deg:.2f} deg, not at {target_deg:.2f} deg",
+)  # fmt: skip
+OTHER_SWITCH = Kind("trends.microswitch", Severity.SUSPECT, "the microswitch ends at {state}, not {wanted}")
+ONE_EXCURSION = Kind(
+    "trends.one-excursion",
+    Severity.CAUTION,
+    "{figure}: there is only one significant excursion of this sign after minute 1.35",
+)
+
+
+def measure(figure: FigureOfMerit, of, basis: str) -> tuple[Value, Doubt | None]:
+    """One figure on one basis, and its doubt; None where it cannot be computed."""
     found = figure.compute(of) or Measured(None)
     value, sigma = finite(found.value), finite(found.sigma)
-    return Value(figure.name, basis, value, None if value is None else sigma, figure.unit), found.doubt
+    doubt = OF_FIGURE(figure=figure.name, sentence=found.doubt) if isinstance(found.doubt, str) else found.doubt
+    return Value(figure.name, basis, value, None if value is None else sigma, figure.unit), doubt
 
 
 @figure_of_merit("N m s")
 def angular_impulse(torque: Torque):
-    """Area under the torque from the motor's start to minute 1.35 after it (000 section V: minute 1.00 to 2.35)."""
+    """Area under the torque from the motor's start to minute 1.35 after it (cover paper section V: minute 1.00 to 2.35)."""
     return torque.impulse(0.0, FIRST_PHASE_S)
 
 
 @figure_of_merit("N m")
 def peak_positive(torque: Torque):
-    """Mean of the two largest excursions after minute 1.35 from the motor's start (000 section V)."""
+    """Mean of the two largest excursions after minute 1.35 from the motor's start (cover paper section V)."""
     return _two_largest(torque, 1)
 
 
 @figure_of_merit("N m")
 def peak_negative(torque: Torque):
-    """Mean of the two smallest excursions after minute 1.35 from the motor's start (000 section V)."""
+    """Mean of the two smallest excursions after minute 1.35 from the motor's start (cover paper section V)."""
     return _two_largest(torque, -1)
 
 
 @figure_of_merit("N m s", judged=False, is_check=True)
 def net_impulse(torque: Torque):
-    """Area under the torque from the motor's start to the end of the record: zero, where nothing acts from outside."""
+    """Area under the torque from the motor's start to the end of the record: zero without an external torque."""
     return torque.impulse(0.0, float(torque.time_s[-1]))
 
 
 @figure_of_merit("N m s")
 def peak_momentum(torque: Torque):
-    """Largest momentum that the mechanism holds on its way, with its sign."""
+    """Largest momentum of the mechanism during its motion, with its sign."""
     own, drawn = torque.momentum()
     k = int(np.nanargmax(np.abs(own)))
     return Measured(float(own[k]), torque.spread_at(drawn, torque.time_s[[k]]))
@@ -234,19 +273,19 @@ def peak_momentum(torque: Torque):
 
 @figure_of_merit("s", judged=False)
 def time_of_peak_positive(torque: Torque):
-    """When the largest excursion comes, after the motor's start."""
+    """Time of the largest excursion after the motor's start."""
     return _time_of_largest(torque, 1)
 
 
 @figure_of_merit("s", judged=False)
 def time_of_peak_negative(torque: Torque):
-    """When the smallest excursion comes, after the motor's start."""
+    """Time of the smallest excursion after the motor's start."""
     return _time_of_largest(torque, -1)
 
 
 @figure_of_merit("s")
 def time_to_stall(actuation: Actuation):
-    """From the motor's start to the jump of its current at the end stop; no better known than the sampling allows."""
+    """From the motor's start to the jump of its current at the end stop; known to a sampling interval."""
     return None if actuation.stall is None else Measured(*actuation.stall)
 
 
@@ -257,26 +296,22 @@ def end_angle(actuation: Actuation):
     if found is None or not len(found[1]):
         return None
     off = abs(found[1][-1] - actuation.target_rad)
-    wanted = (
-        ""
-        if off < END_WITHIN
-        else (
-            f"the {actuation.mechanism.name} ends at {np.degrees(found[1][-1]):.2f} deg, "
-            f"not at {np.degrees(actuation.target_rad):.2f} deg"
-        )
-    )
-    return Measured(float(found[1][-1]), None, wanted)
+    angle = float(found[1][-1])
+    if off < END_WITHIN:
+        return Measured(angle)
+    ends = float(np.degrees(angle)), float(np.degrees(actuation.target_rad))
+    return Measured(angle, None, OTHER_END(mechanism=actuation.mechanism.name, angle_deg=ends[0], target_deg=ends[1]))
 
 
 @figure_of_merit("", judged=False)
 def microswitch(actuation: Actuation):
-    """1 where the last reading of the switch is the commanded end position, 0 where it is another."""
+    """1 where the last reading of the switch is the commanded end position, else 0."""
     found = actuation.samples("microswitch")
     if found is None or not len(found[1]):
         return None
     wanted = {"deploy": "deployed", "stow": "stowed"}[actuation.event.kind]
     right = str(found[1][-1]) == wanted
-    return Measured(float(right), None, "" if right else f"the microswitch ends at {found[1][-1]}, not {wanted}")
+    return Measured(float(right), None, None if right else OTHER_SWITCH(state=str(found[1][-1]), wanted=wanted))
 
 
 @figure_of_merit("A")
@@ -297,7 +332,8 @@ def _two_largest(torque: Torque, sign: int) -> Measured | None:
     if not len(times):
         return None
     found = torque.height(times)
-    doubt = "" if len(times) == 2 else f"only one excursion of sign {sign:+d} stands out after minute 1.35"
+    name = "peak_positive" if sign > 0 else "peak_negative"
+    doubt = None if len(times) == 2 else ONE_EXCURSION(figure=name)
     return Measured(found.value, found.sigma, doubt)
 
 

@@ -1,7 +1,7 @@
-"""What is kept of a fitted Gates model: its sigmas and biases, one engine's burns of one epoch an entry.
+"""The entry of a fitted Gates model: its sigmas and biases, for one engine's burns of one epoch.
 
-The date is the last burn's.  Entries are told apart by chance only if each burn is in one of them: a model of all burns so
-far moves by little from one to the next, however much the engine has changed."""
+The date is the last burn's.  Entries are independent only if each burn is in one of them: a model of all burns so
+far changes little from one to the next, however much the engine has changed."""
 
 from __future__ import annotations
 
@@ -13,46 +13,46 @@ from ...kit.timeline import utc_label
 from ..entry import Entry, Value
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from ...craft.model import Craft
-    from ...estimate.gates import GatesFit, Interval, Part
+    from ...estimate.gates import Ends, GatesResult, Part
 
 KIND = "gates"
-#: What sigmas are judged by: about biases that are estimated, by the additive likelihood; others are kept under their own name.
-_JUDGED = "telemetry"
+#: Readings whose sigmas a trend is judged by, on the basis of that name: about biases that are estimated, by the additive
+#: likelihood.  Others are kept under their own name.
+_JUDGED, _JUDGED_READINGS = "telemetry", ("estimated-bias, additive", "mean-aware, additive")
 
 
-def gates_entry(result: GatesFit, craft: Craft, event_id: str | None, provenance: dict) -> Entry:
-    """The entry of one fit.  Raises BadInput for a table without times: what has no date has no place in a trend."""
+def gates_entry(result: GatesResult, craft: Craft, name: str | None = None) -> Entry:
+    """The entry of one fit.  Raises BadInput for a table without times: a trend needs dates."""
     m = result.maneuvers
     if m.tai_ns is None:
         raise BadInput(
-            "the maneuvers have no times, so their model has no place in a trend",
+            "the maneuvers have no times, so their model cannot enter a trend",
             file=m.source or None, channel="time", remedy="Add the column 'time [utc]'.",
         )  # fmt: skip
     date = utc_label(int(m.tai_ns.max()))
-    basis = f"{result.model}, {result.likelihood}"
-    basis = _JUDGED if basis in ("estimated-bias, additive", "mean-aware, additive") else basis
+    reading = f"{result.model}, {result.likelihood}"
+    basis = _JUDGED if reading in _JUDGED_READINGS else reading
     engine = "" if result.engine is None else f"_{result.engine}"
     values = tuple(v for part in result.parts for v in _values(part, basis, engine))
-    name = event_id or f"{KIND}{engine.replace('_', '-')}-{date[:10]}"
-    return Entry(craft.name, name, KIND, date, values=values, doubts=result.doubts, provenance=provenance)
+    name = name or f"{KIND}{engine.replace('_', '-')}-{date[:10]}"
+    return Entry(craft.name, name, KIND, date, values=values, doubts=result.doubts, provenance=result.provenance)
 
 
-def _values(part: Part, basis: str, engine: str):
-    numbers = [part.point.fixed, part.point.proportional, *part.point.beta]
-    for term, number, interval in zip(part.terms, numbers, [*part.sigmas, *part.biases], strict=True):
-        if term in part.held:
+def _values(part: Part, basis: str, engine: str) -> Iterator[Value]:
+    """Every parameter except those held, which are not estimates."""
+    for term, number, ends in zip(part.terms, part.point.values.tolist(), part.ci95, strict=True):
+        if term.bias_axis is None and term.law in part.held:
             continue
-        known = part.known and _sigma(number, interval) is not None
-        # "bias X, fixed" -> bias_x_fixed; a share of the dV is an angle across it
-        figure = f"{part.name}_{term.replace(', ', '_').replace(' ', '_').lower()}{engine}"
-        unit = "m/s" if term.endswith("fixed") else "" if part.name == "magnitude" else "rad"
-        yield Value(figure, basis, finite(number) if known else None, _sigma(number, interval) if known else None, unit)
+        sigma = _sigma(number, ends) if part.known else None
+        yield Value(f"{term.key}{engine}", basis, finite(number) if sigma is not None else None, sigma, term.unit)
 
 
-def _sigma(number: float, interval: Interval) -> float | None:
+def _sigma(number: float, ends: Ends) -> float | None:
     """One sigma from a 95 % interval; of an estimate on its bound from the limit.  None where an end is open."""
-    low, high = interval
+    low, high = ends
     if low is None or high is None:
         return None
     return high / 1.96 if number == 0 else (high - low) / 3.92

@@ -1,4 +1,4 @@
-"""What is kept of one inertia estimate: the tensor's elements with their total sigma, and the external torque."""
+"""The entry of one inertia estimate: the tensor's elements with their total sigma, and the external torque."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ...craft.model import Craft, tensor
 from ...dynamics.rigid_body import ELEMENTS, elements_of
+from ...kit.doubts import Doubts, Kind, Severity
 from ...kit.plain import finite
 from ...kit.timeline import utc_label
 from ...telemetry.channels import AXES
@@ -19,22 +20,27 @@ if TYPE_CHECKING:
 KIND = "inertia"
 
 
-def inertia_entry(
-    result: InertiaResult, telemetry: Telemetry, craft: Craft, event_id: str | None, provenance: dict
-) -> Entry:
-    """Raises BadInput for telemetry without an epoch."""
+FROM_CRAFT_FILE = Kind(
+    "trends.from-craft-file", Severity.CAUTION, "the tensor comes from the craft file ({source}), without a sigma"
+)
+
+
+def inertia_entry(result: InertiaResult, telemetry: Telemetry, craft: Craft, event_id: str | None = None) -> Entry:
+    """The entry of one record's tensor.  Raises BadInput for telemetry without an epoch."""
     unit, torque_unit = "kg m2", "N m"
     if result.relative:
         unit, torque_unit = "per spin inertia", "rad/s^2, per unit spin inertia"
     values = [
         Value(name, "telemetry", finite(v), finite(s), unit)
-        for name, v, s in zip(ELEMENTS, elements_of(result.inertia), elements_of(result.sigma_total), strict=True)
+        for name, v, s in zip(
+            ELEMENTS, elements_of(result.inertia_kgm2), elements_of(result.inertia_sigma_kgm2), strict=True
+        )
     ]
     values += [
         Value(f"external_torque_{a}", "telemetry", finite(t), finite(s), torque_unit)
-        for a, t, s in zip(AXES, result.torque, result.torque_sigma, strict=True)
+        for a, t, s in zip(AXES, result.external_torque_Nm, result.external_torque_sigma_Nm, strict=True)
     ]
-    return record_entry(KIND, tuple(values), result.doubts, telemetry, craft, event_id, provenance)
+    return record_entry(KIND, tuple(values), result.doubts, telemetry, craft, event_id, result.provenance)
 
 
 def history_entries(craft: Craft) -> list[Entry]:
@@ -46,7 +52,7 @@ def history_entries(craft: Craft) -> list[Entry]:
             values=tuple(
                 Value(n, "telemetry", float(v), None, "kg m2") for n, v in zip(ELEMENTS, elements_of(tensor(m.inertia)), strict=True)
             ),
-            doubts=(f"taken from the craft file ({m.source}), without a sigma",),
+            doubts=Doubts([FROM_CRAFT_FILE(source=m.source)]),
         )
         for m in sorted(known, key=lambda m: m.date)
     ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""The entry of one record, whatever was estimated from it."""
+"""The entry of one record, for any estimate."""
 
 from __future__ import annotations
 
@@ -10,19 +10,20 @@ from ..entry import Entry, Value
 
 if TYPE_CHECKING:
     from ...craft.model import Craft
+    from ...kit.doubts import Doubts
     from ...telemetry.telemetry import Telemetry
 
 
 def record_entry(
-    kind: str, values: tuple[Value, ...], doubts: tuple[str, ...], telemetry: Telemetry, craft: Craft,
+    kind: str, values: tuple[Value, ...], doubts: Doubts, telemetry: Telemetry, craft: Craft,
     event_id: str | None, provenance: dict,
 ) -> Entry:  # fmt: skip
     """The entry of one record; its date is that of the first sample, and its name too unless ``event_id`` gives one.
 
-    Raises BadInput for telemetry without an epoch: what has no date has no place in a trend."""
+    Raises BadInput for telemetry without an epoch: a trend needs dates."""
     if not telemetry.dated:
         raise BadInput(
-            f"the telemetry has no epoch, so its {kind} has no place in a trend",
+            f"the telemetry has no epoch, so its {kind} cannot enter a trend",
             file=telemetry.source or None,
             remedy="Put '# epoch: 2015-09-29T00:00:00 UTC' at the head of the file.",
         )

@@ -1,4 +1,4 @@
-"""What is kept of the wheels of one record: drag, spikes and use, beside what is kept of actuations."""
+"""The entry of the wheels of one record: drag, spikes and use."""
 
 from __future__ import annotations
 
@@ -17,12 +17,10 @@ KIND = "wheels"
 _BASIS = "telemetry"
 
 
-def wheel_entry(
-    result: WheelsResult, telemetry: Telemetry, craft: Craft, event_id: str | None, provenance: dict
-) -> Entry:
+def wheel_entry(result: WheelsResult, telemetry: Telemetry, craft: Craft, event_id: str | None = None) -> Entry:
     """The entry of one record's wheels.  Raises BadInput for telemetry without an epoch."""
     values = tuple(v for w in result.wheels for v in _values(w))
-    return record_entry(KIND, values, result.doubts, telemetry, craft, event_id, provenance)
+    return record_entry(KIND, values, result.doubts, telemetry, craft, event_id, result.provenance)
 
 
 def _values(w: WheelDrag):
@@ -35,8 +33,8 @@ def _values(w: WheelDrag):
         value = finite(value)
         return Value(f"{figure}_{w.name}", _BASIS, value, None if value is None else sigma, unit)
 
-    yield of("coulomb_drag", f and f.coulomb, f and f.sigma_coulomb, torque)
-    yield of("viscous_drag", f and f.viscous, f and f.sigma_viscous, per_rate)
+    yield of("coulomb_drag", f and f.coulomb_Nm, f and f.coulomb_sigma_Nm, torque)
+    yield of("viscous_drag", f and f.viscous_Nms, f and f.viscous_sigma_Nms, per_rate)
     yield of("drag_spikes", None if w.spikes is None else len(w.spikes), None, "")
     yield of("low_speed_dwell", w.use.low_speed_dwell_s, None, "s")
     yield of("zero_crossings", w.use.zero_crossings, None, "")

@@ -1,4 +1,4 @@
-"""A sudden change in a figure: between which two events, how large, and whether chance does as much."""
+"""A sudden change in a figure: between which two events, how large, and its significance."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .slope import Values, shuffles
 
 #: Events needed on each side of a change, and in all before one is looked for.
 _SIDE, _FEWEST = 2, 6
-#: Events up to which a found change is a hint: so few tell a step from a slope badly.
+#: Up to this many events a change found is a hint: they hardly distinguish a step from a slope.
 FEW = 15
 
 
@@ -21,14 +21,14 @@ class Step:
     before: int
     percent: float | None
     p_value: float
-    rather_than_slope: float  # log likelihood of the step less that of a slope: above 0 the step describes better
+    rather_than_slope: float  # log likelihood of the step less that of a slope: above 0 the step fits better
 
 
 def step_of(values: Values, sigmas: np.ndarray) -> Step | None:
     """The likeliest step, by weighted least squares over all places; None with fewer than six events.
 
-    ``sigmas``: standard deviation of every event, up to a factor.  The p-value counts shuffles of the events whose
-    best step is as good: against no change of any kind, so a slope makes it small too."""
+    ``sigmas``: standard deviation of every event, up to a factor.  The p-value is the share of shuffles of the events whose
+    best step fits as well: it tests against no change of any kind, so a slope makes it small too."""
     n = len(values.value)
     if n < _FEWEST:
         return None

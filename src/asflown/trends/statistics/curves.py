@@ -1,7 +1,7 @@
-"""Whole curves of actuations set against each other: registered in time, then compared.
+"""Whole curves of actuations compared: registered in time, then subtracted.
 
 Two runs of a mechanism show the same excursions a second or two apart, since it runs a little faster or slower.  A
-curve is therefore moved and stretched in time (and, where size is judged elsewhere, scaled) until it fits another best.
+curve is therefore shifted and stretched in time (and scaled, where size is judged elsewhere) to fit another best.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ FEWEST_CURVES = 6
 
 @dataclass(frozen=True)
 class Shape:
-    """How far the newest curve's shape lies from the family of past ones, beside how far they lie from each other."""
+    """How far the newest curve's shape lies from the family of past ones, compared with how far they lie from each other."""
 
     distance: float  # rms over time of the difference, in sigmas of the family
     usual: float  # median of the past curves' own, each against the others
@@ -34,7 +34,7 @@ class Shape:
 
 
 def instants(curves: list[Curve]) -> np.ndarray:
-    """Where curves are compared: from the motor's start until nearly nothing more happens, a tenth longer. [s]"""
+    """Span in which curves are compared: from the motor's start until the motion has nearly ended, plus a tenth. [s]"""
     last = min(float(c.time_s[-1]) for c in curves)
     t = np.linspace(0.0, last, 4 * _INSTANTS)
     past = np.cumsum(np.median([_at(c, t) for c in curves], axis=0) ** 2)
@@ -43,7 +43,7 @@ def instants(curves: list[Curve]) -> np.ndarray:
 
 
 def registered(curve: Curve, t: np.ndarray, onto: np.ndarray, scaled: bool) -> np.ndarray:
-    """``curve`` moved and stretched (and ``scaled``) to fit ``onto`` at the instants ``t``.
+    """``curve`` shifted and stretched (and ``scaled``) to fit ``onto`` at the instants ``t``.
 
     The best of a grid of shifts and stretches, then of a finer one about it."""
     best, shift, stretch = np.inf, 0.0, 1.0
@@ -61,7 +61,7 @@ def registered(curve: Curve, t: np.ndarray, onto: np.ndarray, scaled: bool) -> n
 
 
 def distance(a: Curve, b: Curve) -> float:
-    """How different two curves are once registered: rms difference as a share of their own rms, symmetric. []"""
+    """Distance between two registered curves: rms difference as a share of their own rms, symmetric. []"""
     both, t = [], instants([a, b])
     for one, other in ((a, b), (b, a)):
         onto = _at(other, t)
@@ -71,7 +71,7 @@ def distance(a: Curve, b: Curve) -> float:
 
 
 def shape_of(newest: Curve, past: list[Curve], day) -> Shape | None:
-    """The newest curve's shape against the family's, size put aside; None with fewer than six past curves.
+    """The newest curve's shape against the family's, regardless of size; None with fewer than six past curves.
 
     ``day``: of the past curves and the newest, in that order.  A shape may drift over the years, so every instant of
     the registered curves has its own line over the dates.  A past curve lies as far from the line of the others as it
@@ -86,7 +86,7 @@ def shape_of(newest: Curve, past: list[Curve], day) -> Shape | None:
     own = np.array([
         _apart(values[k], np.delete(values, k, axis=0), day[k], np.delete(day[:-1], k)) for k in range(len(past))
     ])  # fmt: skip
-    # lines of the others hold one curve fewer: judge the newest against as many
+    # lines of the others have one curve fewer: judge the newest against as many
     apart = float(np.median([
         _apart(new, np.delete(values, k, axis=0), day[-1], np.delete(day[:-1], k)) for k in range(len(past))
     ]))  # fmt: skip
@@ -96,7 +96,7 @@ def shape_of(newest: Curve, past: list[Curve], day) -> Shape | None:
 
 
 def family_band(curves: list[Curve], share: float = 0.95) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(times, low, high): where a further curve of the family would run with that probability at each instant."""
+    """(times, low, high): prediction interval, at each instant, of a further curve of the family."""
     t = instants(curves)
     values = np.array([_at(c, t) for c in curves])
     n = len(values)
@@ -105,7 +105,7 @@ def family_band(curves: list[Curve], share: float = 0.95) -> tuple[np.ndarray, n
 
 
 def _apart(curve, family, day: float, days) -> float:
-    """rms over time of a curve's difference from the family's lines at its date, in what such a difference scatters.
+    """rms over time of a curve's difference from the family's lines at its date, in units of the scatter of such a difference.
 
     The scatter is taken to be no smaller than a tenth of the usual."""
     X = np.column_stack([np.ones(len(days)), days - np.mean(days)])
@@ -118,7 +118,7 @@ def _apart(curve, family, day: float, days) -> float:
 
 
 def _size(values, onto) -> float:
-    """Factor that fits ``values`` to ``onto`` best, positive and not absurd."""
+    """Factor that fits ``values`` to ``onto`` best, positive and within limits."""
     return float(np.clip((values @ onto) / max(values @ values, 1e-300), 0.2, 5.0))
 
 

@@ -1,7 +1,7 @@
-"""A new actuation against those before it: is one of its figures out of line?
+"""A new actuation against those before it: does one of its figures deviate?
 
-The line through the past is carried to the new date.  How far the new value lies from it, in units of what the past
-scatters, has a known distribution for normal scatter whatever its size: it is drawn by running the same estimator on
+The line through the past is carried to the new date.  How far the new value lies from it, in units of the past
+scatter, has a known distribution for normal scatter whatever its size: it is drawn by running the same estimator on
 noise with the same dates and weights.  False alarms then come at their stated rate, with ten past events as with fifty.
 """
 
@@ -20,7 +20,7 @@ _SEED = 20041209
 
 @dataclass(frozen=True)
 class Newest:
-    """The newest value, what the past let expect, and how unusual the difference is."""
+    """The newest value, the value expected from the past, and the significance of the difference."""
 
     day: float
     value: float
@@ -29,17 +29,17 @@ class Newest:
     high: float
     p_value: float
     spread: float  # one sigma of new values about the expected one
-    chance: np.ndarray  # (K,), differences that noise alone makes, in spreads of that draw
+    chance: np.ndarray  # (K,), differences due to noise alone, in spreads of that draw
     own: np.ndarray  # (K,), one true spread in spreads as estimated in that draw
 
     def power(self, percent: float, alpha: float = 0.05) -> float:
-        """Probability that a sudden change of that size is called out of line at ``alpha``."""
+        """Power: probability that a sudden change of that size is detected at significance ``alpha``."""
         edge = np.quantile(np.abs(self.chance), 1 - alpha)
         shift = abs(percent / 100 * self.expected) / self.spread if self.spread else np.inf
         return float(np.mean(np.abs(self.chance + shift * self.own) > edge))
 
     def detectable(self, alpha: float = 0.05) -> float | None:
-        """Smallest sudden change that is called out of line in 80 of 100 cases. [%]"""
+        """Smallest sudden change that is detected with 80 % power. [%]"""
         if not self.expected or not self.spread:
             return None
         low, high = 0.0, 100 * 50 * self.spread / abs(self.expected)
@@ -61,8 +61,10 @@ def newest_of(values: Values) -> Newest | None:
     hidden = 0.5 * np.median(before.sigma) ** 2 * np.sqrt(2 / (past - 2))
     s = sigmas_about(
         np.sqrt(max(scatter_of(before, size[:past]) ** 2, hidden)) * size, values.sigma
-    )  # of all, the newest too
-    floor = float(np.median(values.sigma / s))  # what the events' own sigmas alone make: the past cannot scatter less
+    )  # of all, including the newest
+    floor = float(
+        np.median(values.sigma / s)
+    )  # scatter due to the events' own sigmas alone: the past cannot scatter less
     start, slope, scale = _line(x[:past], values.value[:past], s[:past], floor)
     same = 1e-9 * np.max(np.abs(before.value))
     expected = float(start + slope * x[-1])
@@ -73,7 +75,7 @@ def newest_of(values: Values) -> Newest | None:
     chance, own = apart / drawn, np.std(apart) / drawn
     usual = np.std(apart) * scale / _usual(drawn)
     difference = values.value[-1] - expected
-    if scale * np.median(s) <= same:  # the past never differed: any difference is news
+    if scale * np.median(s) <= same:  # the past values are equal: any difference is significant
         p, reach, usual = (1.0 if abs(difference) <= same else 0.0), 0.0, 0.0
     else:
         p = float((1 + np.sum(np.abs(chance) >= abs(difference / scale))) / (1 + DRAWS))
@@ -94,5 +96,5 @@ def _line(x, y, s, floor):
 
 
 def _usual(drawn) -> float:
-    """What the scale comes to, in the mean of squares, where the true one is 1."""
+    """Root mean square of the estimated scale where the true one is 1."""
     return float(np.sqrt(np.mean(drawn**2)))

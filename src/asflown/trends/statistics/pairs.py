@@ -1,8 +1,8 @@
 """Cold against warm: is a mechanism different after a long rest?
 
-"Looks similar" is no answer.  The question is turned round: is the difference certainly smaller than a margin?  Two
-one-sided tests of paired relative differences say so (Schuirmann 1987), with the scatter of all events pooled, since
-three pairs say little of their own; and the smallest margin that these data could prove is stated.
+An equivalence test: is the difference smaller than a margin?  Two one-sided tests of paired relative differences
+(Schuirmann 1987) answer, with the scatter of all events pooled, since three pairs give a poor estimate of it.  The
+smallest margin that these data could prove is stated.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from .curves import TORQUE, distance
 if TYPE_CHECKING:
     from .slope import Trend
 
-#: A rest of this long makes an actuation cold; the next one is warm when itself it comes within so long. [days]
+#: A rest of this long makes an actuation cold; the next one is warm when it follows within this time.  Those of the paper's cold starts:
+#: not ``STALE_NS``, after which what is known of a craft is doubted. [days]
 COLD_DAYS, WARM_DAYS = 200.0, 100.0
-#: Relative difference that counts as none.
+#: Relative difference within which both count as equivalent.
 MARGIN = 0.15
 
 
@@ -55,7 +56,7 @@ class Equivalence:
 
 @dataclass(frozen=True)
 class Distances:
-    """Whole curves: cold against its warm, beside neighbours in date that are no such pair."""
+    """Whole curves: each cold one against its warm one, compared with neighbours in date that are not pairs."""
 
     pairs: tuple[float, ...]
     others: tuple[float, ...]
@@ -65,7 +66,7 @@ class Distances:
 def rests(entries: list[Entry]) -> dict[str, float]:
     """Days since the motor's last actuation of any kind, by event; the first of each motor has none.
 
-    Computed from the dates, whatever a list says.  A motor that is not named is one motor."""
+    Computed from the dates, not taken from a list.  Events without a motor's name count as one motor."""
     found: dict[str, float] = {}
     latest: dict[str | None, float] = {}
     for e in sorted(entries, key=lambda e: e.day):
@@ -98,9 +99,9 @@ def find_pairs(entries: list[Entry], kind: str = "deploy") -> list[Pair]:
 
 
 def equivalence(figure: str, pairs: list[Pair], trend: Trend, margin: float = MARGIN) -> Equivalence | None:
-    """Warm against cold of a figure; None without pairs that hold it on both sides, of one sign.
+    """Warm against cold of a figure; None without pairs that have it on both sides, with one sign.
 
-    The scatter is that of all events about their trend, relative; the slope between the two dates is taken off."""
+    The scatter is that of all events about their trend, relative; the slope between the two dates is subtracted."""
     found = []
     for p in pairs:
         a, b = (v.value if (v := e.best(figure)) is not None else None for e in (p.cold, p.warm))
@@ -129,7 +130,7 @@ def equivalence(figure: str, pairs: list[Pair], trend: Trend, margin: float = MA
 
 
 def curve_distances(entries: list[Entry], pairs: list[Pair], kind: str = "deploy") -> Distances | None:
-    """Registered distances of the pairs' torques, and of neighbours in date that are no pair; None without pairs."""
+    """Registered distances of the pairs' torques, and of neighbours in date that are not pairs; None without pairs."""
     named = {(p.cold.event, p.warm.event) for p in pairs}
     with_curve = [
         (e.event, c)

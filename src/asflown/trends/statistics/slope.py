@@ -1,12 +1,12 @@
-"""A handful of values over years: the trend, how sure, and what would have been seen.
+"""A few values over years: the trend, its significance, and its power.
 
     y_i = a + b t_i + e_i,    e_i of variance tau^2 + sigma_i^2
 
 sigma_i is each event's own, tau the scatter from event to event (Paule and Mandel's estimate), in proportion to the
 line where the values keep one sign: a mechanism that pushes harder also scatters more.  The line is Huber's
-M-estimate.  Its p-value and intervals come from one permutation test: under the right hypothesis the residuals do not
-know their dates, so that shuffling them tells how large the statistic sum d_i psi(r_i / s_i) gets by chance.  Intervals
-are the hypotheses the test does not refuse; with ten events a normal approximation would be too narrow.
+M-estimate.  Its p-value and intervals come from one permutation test: under the right hypothesis the residuals are
+exchangeable in date, so that shuffling them gives the distribution of the statistic sum d_i psi(r_i / s_i).  Intervals
+hold the hypotheses that the test does not reject; with ten events a normal approximation would be too narrow.
 """
 
 from __future__ import annotations
@@ -19,10 +19,12 @@ from math import factorial
 import numpy as np
 from scipy import stats
 
+from ...kit.scatter import robust_sigma
+
 YEAR = 365.25  # days
 #: Residuals count at most this many scales: 95 % efficient for normal errors (Huber 1964).
 HUBER = 1.345
-#: Shuffles of the residuals; all of them where there are no more.
+#: Shuffles of the residuals; all permutations where there are no more.
 SHUFFLES = 3999
 #: Fewest events with which a 95 % interval can exist: 2 / 4! is above 0.05.
 FEWEST = 5
@@ -50,7 +52,7 @@ class Values:
 
 @dataclass(frozen=True)
 class Trend:
-    """A line through one figure's values, and how sure it is.  Changes are of the line, from first to last event."""
+    """A line through one figure's values, with its intervals.  Changes are of the line, from first to last event."""
 
     values: Values
     start: float  # the line at the first event
@@ -72,7 +74,7 @@ class Trend:
         return sigmas_about(self.scatter * sizes(self.values.share, self.values.value), self.values.sigma)
 
     def power(self, percent: float) -> float:
-        """Probability that a change of that size, first to last event, is told from none at 5 %."""
+        """Power: probability that a change of that size, first to last event, is detected at 5 %."""
         return power_of_slope(abs(percent / 100 * self.start), self.residual, self.values.share)
 
     def band(self, day, share: float = 0.95) -> tuple[np.ndarray, np.ndarray]:
@@ -90,7 +92,7 @@ class Trend:
         return self.at(day) - reach, self.at(day) + reach
 
     def crossing(self, limit: float, years: float = 20.0) -> tuple[float | None, float | None]:
-        """Days (from 2000-01-01) at which the 95 % band's edge, and the line, first reach ``limit``; None within ``years`` not."""
+        """Days (from 2000-01-01) at which the 95 % band's edge, and the line, first reach ``limit``; None where not within ``years``."""
         last = self.values.day[-1]
         days = last + np.linspace(0, years * YEAR, 2001)
         rising = bool(limit >= self.at(last))
@@ -108,7 +110,7 @@ def trend_of(values: Values) -> Trend:
     """The trend of a figure.  Raises ValueError for fewer than three events, or none later than the first."""
     day, y = values.day, values.value
     if len(day) < 3 or day[-1] <= day[0]:
-        raise ValueError("a trend needs three events or more, at different times")
+        raise ValueError("a trend needs at least three events at different times")
     u = values.share
     one = np.ones_like(u)
     size = sizes(u, y)
@@ -190,25 +192,25 @@ def shuffles(count: int) -> np.ndarray:
 
 
 def detectable(residual: float, share) -> float:
-    """Smallest change over the span that 5 % tests see with 80 % power, in the residual's unit."""
+    """Smallest change over the span that a test at 5 % detects with 80 % power, in the residual's unit."""
     freedom = len(share) - 2
     return _error_of_rise(residual, share) * float(stats.t.ppf(0.975, freedom) + stats.t.ppf(POWER, freedom))
 
 
 def power_of_slope(change: float, residual: float, share) -> float:
-    """Probability that a change of that size over the span is told from none at 5 %."""
+    """Power: probability that a change of that size over the span is detected at 5 %."""
     if residual == 0:
         return 1.0 if change else 0.05
     freedom = len(share) - 2
     edge = stats.t.ppf(0.975, freedom)
     away = change / _error_of_rise(residual, share)
-    if away > 30:  # beyond the distribution's numerics, and certain
+    if away > 30:  # beyond the range of the distribution's numerics: power 1
         return 1.0
     return float(stats.nct.sf(edge, freedom, away) + stats.nct.cdf(-edge, freedom, away))
 
 
 def holm(p_values) -> np.ndarray:
-    """p-values adjusted for having looked at them all (Holm 1979)."""
+    """p-values adjusted for testing all of them (Holm 1979)."""
     p = np.asarray(p_values, float)
     order = np.argsort(p)
     adjusted = np.empty_like(p)
@@ -229,11 +231,11 @@ def _psi(z, scale):
 def mad(z) -> np.ndarray:
     """Standard deviation from the median size, corrected for a line having been fitted."""
     n = np.shape(z)[-1]
-    return np.median(np.abs(z), axis=-1) / 0.6745 * np.sqrt(n / max(n - 2, 1))
+    return robust_sigma(z, axis=-1) * np.sqrt(n / max(n - 2, 1))
 
 
 def sizes(x, y, at=None) -> np.ndarray:
-    """Size of a line through ``y`` over its mean, at ``x`` (or ``at``): what scatter is in proportion to; 1 across zero."""
+    """Size of a line through ``y`` over its mean, at ``x`` (or ``at``): the scatter is in proportion to it; 1 across zero."""
     where = x if at is None else at
     if not (np.all(y > 0) or np.all(y < 0)):
         return np.ones_like(where)
@@ -276,13 +278,13 @@ def _p(y, s, nuisance, direction, scale, orders) -> float:
     left = z - m * g
     psi = _psi(
         left, max(scale, float(mad(left)))
-    )  # far from the right hypothesis everything is large, nothing an outlier
+    )  # far from the right hypothesis all residuals are large, none is an outlier
     chance = np.abs(psi[orders] @ d)
     return float((1 + np.sum(chance >= abs(d @ psi) * (1 - 1e-12))) / (1 + len(orders)))
 
 
 def _edge(p_of, estimate: float, step: float, alpha: float = 0.05) -> float:
-    """Where hypotheses from ``estimate`` on, in the direction of ``step``, begin to be refused; infinite where none is."""
+    """Where hypotheses from ``estimate`` on, in the direction of ``step``, begin to be rejected; infinite where none is."""
     inside, outside = estimate, estimate + 3 * step
     for _ in range(20):
         if p_of(outside) <= alpha:

@@ -1,4 +1,4 @@
-"""The trend store: what is kept, where, and its migrations."""
+"""The trend store: its contents, place and migrations."""
 
 from .place import label, url_of
 from .store import TrendStore

@@ -1,4 +1,4 @@
-"""Where a trend store lies: a path or a URL, how it is reached, and what its errors mean."""
+"""Where a trend store lies: a path or a URL, how it is opened, and its error messages."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ _FORMS = "Name a file, sqlite:///FILE or postgresql://USER@HOST/DATABASE."
 _POSTGRESQL = ("postgresql", "postgres", "postgresql+psycopg")
 #: A URL with a slash lost, as in Path("postgresql://…"): as a path it would become a folder named by the password.
 _NEARLY_URL = re.compile(r"(sqlite|postgres(ql)?)(\+\w+)?:(?!//)")
-#: What SQLite and PostgreSQL say -> what to do.
+#: Part of SQLite's or PostgreSQL's message -> remedy.
 _REMEDIES = {
-    "not a database": "Name another file, or a new one: this is not SQLite.",
+    "not a database": "Name another file, or a new one: this one is not SQLite.",
     "malformed": "The file is damaged: restore it from a backup.",
     "lock timeout": "Another program holds it: let that finish, then try again.",
     "locked": "Another program holds it: let that finish, then try again.",
     "is full": "Make room on the disk, then try again: nothing of this entry was kept.",
     "readonly": "Copy the store to a place you may write to.",
     "read-only": "Copy the store to a place you may write to.",
-    "permission denied": "Ask for the right to create, read and insert there.",
-    "unable to open": "Check the path, and the right to read and write there: SQLite keeps files beside the store.",
+    "permission denied": "Ask for the rights to create, read and insert there.",
+    "unable to open": "Check the path, and the right to read and write there: SQLite writes further files to the same folder.",
     "no schema has been selected": "Create the schema that search_path names.",
 }
 
@@ -50,9 +50,9 @@ def url_of(place: str | Path) -> URL:
     """A bare path means SQLite.  Raises BadInput, which never repeats what may hold a password."""
     name = str(place)
     if not name or name == ":memory:":
-        raise BadInput("the trend store has no place", remedy=_FORMS)
+        raise BadInput("no path or URL of the trend store is given", remedy=_FORMS)
     if _NEARLY_URL.match(name):
-        raise BadInput("a URL that lacks its //", remedy=_FORMS)
+        raise BadInput("this URL lacks its //", remedy=_FORMS)
     if "://" not in name:
         return URL.create("sqlite", database=name)
     scheme = name.split("://")[0]
@@ -65,7 +65,7 @@ def url_of(place: str | Path) -> URL:
     if scheme in _POSTGRESQL:
         return url.set(drivername="postgresql+psycopg")
     if scheme != "sqlite":
-        raise BadInput(f"no trend store is kept in {scheme!r}", remedy=_FORMS)
+        raise BadInput(f"a trend store cannot be kept in {scheme!r}", remedy=_FORMS)
     if url.database in (None, "", ":memory:") or url.host or url.query:
         raise BadInput(f"{label(url)} names no file", remedy=_FORMS)
     return url
@@ -85,7 +85,7 @@ def reach(url: URL, *, create: bool) -> tuple[Engine, Engine]:
 
 @contextmanager
 def plainly(url: URL) -> Iterator[None]:
-    """What the database complains of, as BadInput."""
+    """Errors of the database, as BadInput."""
     try:
         yield
     except ArgumentError as why:  # of the URL's options
@@ -104,7 +104,7 @@ def plainly(url: URL) -> Iterator[None]:
 
 
 def switch_to_wal(engine: Engine) -> None:
-    """Readers and one writer at once; kept by the file.  Only for a file that is ours."""
+    """Readers and one writer at once; kept by the file.  Only for a file that is a trend store."""
     raw = engine.raw_connection()
     until = time.monotonic() + BUSY_S
     try:
@@ -112,7 +112,7 @@ def switch_to_wal(engine: Engine) -> None:
             try:
                 raw.cursor().execute("PRAGMA journal_mode = WAL")
                 return
-            except sqlite3.OperationalError as why:  # this pragma does not wait by itself
+            except sqlite3.OperationalError as why:  # this pragma does not wait for a lock
                 if "locked" not in str(why) or time.monotonic() > until:
                     raise
                 time.sleep(0.02)
@@ -121,7 +121,7 @@ def switch_to_wal(engine: Engine) -> None:
 
 
 def wait_for_turn(connection: Connection) -> None:
-    """Alone among writers until the transaction ends; in SQLite BEGIN IMMEDIATE has seen to it."""
+    """The only writer until the transaction ends; in SQLite BEGIN IMMEDIATE ensures it."""
     if connection.dialect.name == "postgresql":
         connection.execute(text(f"SET LOCAL lock_timeout = '{BUSY_S:g}s'"))
         connection.execute(select(func.pg_advisory_xact_lock(_LOCK)))
@@ -132,15 +132,15 @@ def _sqlite(url: URL, create: bool) -> tuple[Engine, Engine]:
     if create:
         check_place(path)
         path.parent.mkdir(parents=True, exist_ok=True)
-    elif not os.path.isfile(path):  # which no name and no right can make raise
-        raise BadInput("no trend store is there", file=path, remedy="Check the path; `asflown trend add` makes one.")
+    elif not os.path.isfile(path):  # unlike Path.is_file, never raises
+        raise BadInput("there is no trend store", file=path, remedy="Check the path; `asflown trend add` makes one.")
     writable = os.access(path, os.W_OK) or not os.path.exists(path)
     if create and not writable:
         raise BadInput("cannot be written", file=path, remedy=_REMEDIES["readonly"])
     mode = "mode=rwc" if create else "mode=rw"
     if not (writable and os.access(path.parent, os.W_OK)):
         # In a folder that cannot be written, SQLite cannot make the files beside a store in WAL mode;
-        # with no such file there, nobody is writing, and the file may be read as it is.
+        # without such a file no process is writing, and the store may be read as it is.
         mode = "mode=ro" if os.path.exists(f"{path}-wal") else "mode=ro&immutable=1"
 
     def connect() -> sqlite3.Connection:

@@ -17,7 +17,7 @@ from sqlalchemy import (
 )
 
 #: The newest migration.  A test holds it to migrations/versions.
-HEAD = "0001"
+HEAD = "0002"
 #: Our own name, so that a database may hold another program's alembic_version in another schema.
 VERSION_TABLE = "trend_store_version"
 
@@ -40,7 +40,8 @@ ENTRY = Table(
     Column("motor", String),
     Column("date", String, nullable=False),  # UTC, ISO 8601
     Column("note", Text, nullable=False),
-    Column("doubts", JSON, nullable=False),
+    Column("doubts", JSON, nullable=False),  # sentences
+    Column("doubts_detail", JSON),  # the same with kind and severity; null in entries of earlier versions
     Column("provenance", JSON, nullable=False),
     Column("added", String, nullable=False),  # UTC, ISO 8601
     UniqueConstraint("craft", "event", "revision"),

@@ -1,4 +1,4 @@
-"""The trend store: what was found of every actuation, kept for years and never changed."""
+"""The trend store: results of every actuation, kept for years and never changed."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from sqlalchemy import Connection, Engine, exists, func, insert, inspect, select, text
 
+from ...kit.doubts import Doubts, doubt_from
 from ...kit.errors import BadInput, some_of
 from ...kit.plain import finite, plain
 from ..entry import Curve, Entry, Value
@@ -40,10 +41,26 @@ class TrendStore:
 
     @classmethod
     def open(cls, url: str | Path, *, create: bool = True) -> TrendStore:
-        """The store at a path (SQLite) or URL, with its schema brought up to date.
+        """Open a store, and bring its schema up to date.
 
-        ``create`` False: for reading; a store must be there, and nothing is written where its schema is current.
-        Raises BadInput where there is no store, it cannot be reached or used, or (``create``) not be written."""
+        Parameters
+        ----------
+        url : str or Path
+            A path (SQLite), sqlite:///FILE or postgresql://USER@HOST/DATABASE.
+        create : bool
+            True: create the store where there is none, and require that it can be written.  False: for reading; the store
+            must exist, and nothing is written where its schema is current.
+
+        Returns
+        -------
+        TrendStore
+            A context manager; ``close`` it, or use ``with``.
+
+        Raises
+        ------
+        BadInput
+            Where there is no store, it cannot be reached or used, or (``create``) cannot be written.
+        """
         place = url_of(url)
         with plainly(place):
             store = cls(place, *reach(place, create=create))
@@ -73,10 +90,25 @@ class TrendStore:
         return label(self._url)
 
     def add(self, entries: Entry | Iterable[Entry]) -> list[Entry]:
-        """Keep entries, each whole or not at all; the same with ``revision`` and ``added``.
+        """Add entries; an event that is there already gets a further revision.
 
-        Every entry is on the disk before the next is begun.  Values that are not finite are kept as None.
-        Raises BadInput before anything is kept where an entry cannot be, or where the store cannot be written."""
+        Each entry is stored completely or not at all, and is on the disk before the next is begun.
+
+        Parameters
+        ----------
+        entries : Entry or iterable of Entry
+            Values that are not finite are stored as None.
+
+        Returns
+        -------
+        list of Entry
+            The same, with their ``revision`` and ``added`` (UTC).
+
+        Raises
+        ------
+        BadInput
+            Before anything is stored, where an entry contradicts itself; and where the store cannot be written.
+        """
         ready = [_ready(e) for e in ([entries] if isinstance(entries, Entry) else entries)]
         with plainly(self._url):
             return [self._add(e) for e in ready]
@@ -90,10 +122,29 @@ class TrendStore:
         revisions: Literal["latest", "all"] = "latest",
         curves: bool = False,
     ) -> list[Entry]:
-        """In order of date, event and revision; an event without telemetry has no values.
+        """Entries in order of date, event and revision.
 
-        ``kind`` is that of the chosen revisions: an event whose latest is a stow is no deploy.
-        ``curves`` False leaves the curves in the store."""
+        Parameters
+        ----------
+        craft, kind, event : str, optional
+            Only entries of this craft, kind and event.  The kind is that of the chosen revisions.
+        revisions : {'latest', 'all'}
+            The latest of every event, or all.
+        curves : bool
+            Whether to read the curves as well.
+
+        Returns
+        -------
+        list of Entry
+            An event without telemetry has no values.
+
+        Raises
+        ------
+        BadInput
+            Where the store cannot be read or a curve is damaged.
+        ValueError
+            For another value of ``revisions``.
+        """
         query = select(ENTRY)
         for column, wanted in ((ENTRY.c.craft, craft), (ENTRY.c.kind, kind), (ENTRY.c.event, event)):
             if wanted is not None:
@@ -116,14 +167,14 @@ class TrendStore:
         found = [
             Entry(
                 r.craft, r.event, r.kind, r.date, r.motor, r.note, tuple(values[r.id]), tuple(drawn[r.id]),
-                tuple(r.doubts), r.provenance, r.revision, r.added,
+                _doubts(r), r.provenance, r.revision, r.added,
             ) for r in rows
         ]  # fmt: skip
-        # Here and not in the database, whose order of letters depends on where it was set up.
+        # Sorted here and not in the database, whose collation depends on its set-up.
         return sorted(found, key=lambda e: (e.date, e.event, e.revision, e.craft))
 
     def crafts(self) -> list[str]:
-        """Names of the crafts of which something is kept."""
+        """Names of the crafts with entries."""
         with plainly(self._url), self._reading.connect() as connection:
             return sorted(connection.scalars(select(ENTRY.c.craft).distinct()))
 
@@ -134,7 +185,8 @@ class TrendStore:
             last = connection.scalar(select(func.max(ENTRY.c.revision)).where(same))
             added = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%S")
             entry = replace(entry, revision=(last or 0) + 1, added=added)
-            row = {c.name: getattr(entry, c.name) for c in ENTRY.c if c.name != "id"}
+            row = {c.name: getattr(entry, c.name) for c in ENTRY.c if c.name not in ("id", "doubts", "doubts_detail")}
+            row |= plain(entry.doubts.record())
             (key,) = connection.execute(insert(ENTRY).values(row)).inserted_primary_key or ()
             if entry.values:
                 rows = [{"entry_id": key, "place": i, **vars(v)} for i, v in enumerate(entry.values)]
@@ -151,7 +203,7 @@ class TrendStore:
             return connection.scalar(text(f"SELECT version_num FROM {VERSION_TABLE}")) or "none"
         if tables:
             raise BadInput(
-                f"a database, but not a trend store: it holds {some_of(tables, 5)}",
+                f"a database, but not a trend store: its tables are {some_of(tables, 5)}",
                 file=self,
                 remedy="Name an empty database (or schema) or a new file.",
             )
@@ -159,7 +211,7 @@ class TrendStore:
 
     def _migrate(self, version: str | None, create: bool) -> None:
         if version is None and not create:
-            raise BadInput("no trend store is there", file=self, remedy="`asflown trend add` makes one.")
+            raise BadInput("there is no trend store", file=self, remedy="`asflown trend add` makes one.")
         from alembic import command
         from alembic.config import Config
         from alembic.script import ScriptDirectory
@@ -178,7 +230,7 @@ class TrendStore:
         with _MIGRATING, self._writing.begin() as connection:
             wait_for_turn(connection)
             config.attributes.update(connection=connection, version_table=VERSION_TABLE)
-            command.upgrade(config, "head")  # which does nothing where somebody was faster
+            command.upgrade(config, "head")  # does nothing where another process has done it
 
     def _check_writable(self) -> None:
         if self._url.drivername == "sqlite":  # reach() has looked; a copy by VACUUM INTO has lost its WAL mode
@@ -187,7 +239,7 @@ class TrendStore:
         with self._writing.connect() as connection:
             may = connection.scalar(select(func.has_table_privilege("entry", "INSERT")))
             if not may or connection.scalar(text("SHOW transaction_read_only")) == "on":
-                raise BadInput("may be read, but not written", file=self, remedy="Ask for the right to insert there.")
+                raise BadInput("can be read but not written", file=self, remedy="Ask for the right to insert into it.")
 
     def _curve(self, row) -> Curve:
         try:
@@ -199,12 +251,17 @@ class TrendStore:
             ) from None
 
 
+def _doubts(row) -> Doubts:
+    """Doubts of a kept entry; those of earlier versions are sentences of unknown kind."""
+    return Doubts(row.doubts if row.doubts_detail is None else map(doubt_from, row.doubts_detail))
+
+
 def _of(table, chosen):
     return select(table).where(table.c.entry_id.in_(chosen)).order_by(table.c.entry_id, table.c.place)
 
 
 def _packed(curve: Curve) -> bytes:
-    """An .npz file: it says itself what it holds, is compressed, and keeps every bit of a float64."""
+    """An .npz file: self-describing, compressed, and exact for float64."""
     given = {"time_s": curve.time_s, "values": curve.values, "sigma": curve.sigma}
     arrays: dict[str, Any] = {k: np.asarray(a, "<f8") for k, a in given.items() if a is not None}
     file = io.BytesIO()
@@ -213,26 +270,28 @@ def _packed(curve: Curve) -> bytes:
 
 
 def _ready(entry: Entry) -> Entry:
-    """The entry as it will be kept.  Raises BadInput where it contradicts itself or cannot be written down."""
+    """The entry as it will be kept.  Raises BadInput where it contradicts itself or cannot be stored."""
     where = f"entry {entry.event!r} of {entry.craft!r}"
     names = [f"figure {v.figure} ({v.basis})" for v in entry.values] + [f"curve {c.name}" for c in entry.curves]
     twice = next((n for n in names if names.count(n) > 1), None)
     if twice is not None:
-        raise BadInput(f"{where} has the {twice} twice", remedy="Each may be there once.")
+        raise BadInput(f"{where} has the {twice} twice", remedy="Give each once.")
     for c in entry.curves:
         shapes = {np.shape(a) for a in (c.time_s, c.values, c.sigma) if a is not None}
         if len(shapes) > 1 or len(next(iter(shapes))) != 1:
             raise BadInput(
                 f"{where}: the arrays of curve {c.name!r} differ in shape", remedy="Give time, values and sigma (N,)."
             )
-    texts = [entry.craft, entry.event, entry.kind, entry.date, entry.motor or "", entry.note, *entry.doubts]
+    texts = [entry.craft, entry.event, entry.kind, entry.date, entry.motor or "", entry.note, *entry.doubts.sentences()]
     texts += [t for v in entry.values for t in (v.figure, v.basis, v.unit)]
     texts += [t for c in entry.curves for t in (c.name, c.unit)]
     if any("\0" in t or t.encode(errors="ignore").decode() != t for t in texts):
-        raise BadInput(f"{where} has text that no database keeps (NUL or half a character)", remedy="Take it out.")
+        raise BadInput(
+            f"{where} has text that a database cannot store (NUL or an unpaired surrogate)", remedy="Remove it."
+        )
     if not (entry.craft and entry.event):
         raise BadInput("an entry without craft or event", remedy="Name both.")
-    if not _DATE.fullmatch(entry.date):  # entries are put in order by it
+    if not _DATE.fullmatch(entry.date):  # entries are sorted by it
         raise BadInput(f"{where} has the date {entry.date!r}", remedy="Give it in UTC, as 2015-09-29T00:00:00.")
     values = tuple(replace(v, value=finite(v.value), sigma=finite(v.sigma)) for v in entry.values)
-    return replace(entry, values=values, doubts=tuple(entry.doubts), provenance=plain(entry.provenance))
+    return replace(entry, values=values, doubts=Doubts(entry.doubts), provenance=plain(entry.provenance))

@@ -16,56 +16,61 @@ AGAINST = typer.Option(
 )
 
 
-def maneuvers_from(file: Path, engine: str | None, without: str | None):
+def maneuvers_from(file: Path, engine: str | None, without: str | None = None):
     """The maneuvers of one engine, without some."""
-    from ..maneuvers.table import load_maneuvers
+    from ...maneuvers.table import load_maneuvers
 
     burns = load_maneuvers(file).of(engine)
     return burns if without is None else burns.without([w.strip() for w in without.split(",")], "left out by --without")
 
 
-def past_named(name: str | None, engine: str):
+def past_named(name: str | None, engine: str | None):
     """A model of the history, or of an earlier fit's JSON; ``engine``, as the file calls it, says whose where the name does not."""
-    from ..maneuvers.earlier import earlier_model
-    from ..maneuvers.history import past_model
+    from ...maneuvers.earlier import earlier_model
+    from ...maneuvers.history import past_model
 
     if name is None:
         return None
-    return earlier_model(Path(name), engine) if name.endswith(".json") else past_model(name, engine)
+    return earlier_model(Path(name), engine or "") if Path(name).suffix == ".json" else past_model(name, engine)
 
 
-def held(asked: list[str], engine: str) -> dict[str, float]:
+def held(asked: list[str], engine: str | None) -> dict[str, float]:
     """'pointing_fixed=0 mm/s' or 'pointing=2000' (a model of the history) -> terms and their values."""
-    from ..estimate.gates import TERMS
-    from ..kit.errors import BadInput, some_of
-    from ..kit.quantities import quantity
+    from ...estimate.gates import SIGMAS
+    from ...kit.errors import BadInput, some_of
 
     found: dict[str, float] = {}
     for text in asked:
         name, equals, value = (part.strip() for part in text.partition("="))
-        terms = [t for t in TERMS if t == name or t.startswith(f"{name}_")]
+        terms = [term for key, term in SIGMAS.items() if name in (key, term.quantity)]
         if not equals or not terms:
             raise BadInput(
                 f"--hold {text!r} names no term",
-                remedy=f"Write TERM=VALUE or TERM=MODEL; terms: {some_of(TERMS)}, magnitude, pointing.",
+                remedy=f"Write TERM=VALUE or TERM=MODEL; terms: {some_of(SIGMAS)}, magnitude, pointing.",
             )
-        try:
-            model = past_named(value, engine).model
-        except BadInput as why:
-            if len(terms) > 1:
-                raise BadInput(f"--hold {text!r}: {why.what}", remedy=why.remedy) from None
-            unit = "m/s" if name.endswith("fixed") else "rad" if name.startswith("pointing") else ""
-            found[name] = quantity(value, unit)
-            continue
-        of = dict(zip(TERMS, (model.magnitude_fixed_mps, model.magnitude_proportional, model.pointing_fixed_mps, model.pointing_proportional_rad), strict=True))  # fmt: skip
-        found |= {t: of[t] for t in terms}
+        found |= _values(text, terms, value, engine)
     return found
+
+
+def _values(text: str, terms: list, value: str, engine: str | None) -> dict[str, float]:
+    """The values of these sigmas in a model, or the one value of a single one."""
+    from ...estimate.gates import Law
+    from ...kit.errors import BadInput
+    from ...kit.quantities import quantity
+
+    try:
+        model = past_named(value, engine).model
+    except BadInput as why:
+        if len(terms) > 1:
+            raise BadInput(f"--hold {text!r}: {why.what}", remedy=why.remedy) from None
+        return {terms[0].key: quantity(value, terms[0].unit)}
+    return {t.key: dict(zip(Law, model.parameters(t.quantity), strict=False))[t.law] for t in terms}
 
 
 def removed_bias(text: str | None) -> tuple[float, float]:
     """'-4 mm/s, 0.03 %' -> m/s and a fraction; the second may be left out."""
-    from ..kit.errors import BadInput
-    from ..kit.quantities import quantity
+    from ...kit.errors import BadInput
+    from ...kit.quantities import quantity
 
     parts = [p.strip() for p in (text or "0 mm/s").split(",")]
     if len(parts) > 2:

@@ -1,22 +1,22 @@
-"""What the trend verbs print for a person."""
+"""Text of the trend verbs."""
 
 from __future__ import annotations
 
-from .output import wrapped
+from ..output import wrapped
 
 
 def print_figure(f, rows: bool) -> None:
-    from ..trends.record import sudden_words
+    from ...trends.record import sudden_words
 
     t = f.trend
     newest = ""
     if f.rows:
         last = f.rows[-1]
-        newest = f"{last.value:+.4g}" + ("" if last.sigma is None else f" +- {last.sigma:.2g}") + f" {f.unit}".rstrip()
+        newest = f"{last.value:+.4g}" + ("" if last.sigma is None else f" ± {last.sigma:.2g}") + f" {f.unit}".rstrip()
     print(f"{f.figure} · {f.basis} · {newest} · {f.verdict}")
     if rows:
         for r in f.rows:
-            print(f"  {r.event:24s} {r.date[:10]}  {r.value:+.4g}" + ("" if r.sigma is None else f" +- {r.sigma:.2g}"))
+            print(f"  {r.event:24s} {r.date[:10]}  {r.value:+.4g}" + ("" if r.sigma is None else f" ± {r.sigma:.2g}"))
     if t is None:
         print("  too few events for a trend")
         return
@@ -24,9 +24,9 @@ def print_figure(f, rows: bool) -> None:
     if t.change_percent_ci95:
         change += f" (95 %: {t.change_percent_ci95[0]:+.1f} to {t.change_percent_ci95[1]:+.1f})"
     print(f"  {change or 'no relative change'}   slope {t.slope_per_year:+.3g} a year   p {t.p_value:.2g}" + (
-        "" if f.trend_p_adjusted is None else f" ({f.trend_p_adjusted:.2g} for all figures)"))  # fmt: skip
+        "" if f.trend_p_adjusted is None else f" ({f.trend_p_adjusted:.2g} over all figures)"))  # fmt: skip
     if t.detectable_percent is not None:
-        print(f"  a change of {t.detectable_percent:.0f} % would have been seen in 8 of 10 such histories")
+        print(f"  a change of {t.detectable_percent:.0f} % would be detected with 80 % power")
     if (sudden := sudden_words(f)) is not None:
         print(wrapped("  ", sudden))
     for reason in f.reasons:
@@ -35,7 +35,7 @@ def print_figure(f, rows: bool) -> None:
 
 def print_newest(health, figures) -> None:
     print(
-        f"  {'figure':24s} {'value':>11s} {'expected':>11s} {'95 % from':>11s} {'to':>11s} {'p':>7s} {'all':>7s}  seen from"
+        f"  {'figure':24s} {'value':>11s} {'expected':>11s} {'95 % from':>11s} {'to':>11s} {'p':>7s} {'all':>7s}  detectable"
     )
     for f in figures:
         n = f.newest
@@ -50,7 +50,7 @@ def print_newest(health, figures) -> None:
     if health.shape is not None:
         s = health.shape
         print(
-            f"  shape of the torque: {s.distance:.2f} from the family, the others usually {s.usual:.2f}; p {s.p_value:.2g}"
+            f"  shape of the torque: distance {s.distance:.2f} from the family, median of the others {s.usual:.2f}; p {s.p_value:.2g}"
         )
 
 
@@ -58,7 +58,7 @@ def print_cold_warm(record: dict) -> None:
     for p in record["pairs"]:
         print(f"  cold {p['cold']} (after {p['rest_days']} days) · warm {p['warm']}")
     if record["equivalence"]:
-        print(f"  {'figure':24s} {'warm - cold':>12s} {'90 % interval':>20s} {'p':>8s}   certain within")
+        print(f"  {'figure':24s} {'warm - cold':>12s} {'90 % interval':>20s} {'p':>8s}   equivalent within")
     for e in record["equivalence"]:
         low, high = e["difference_percent_ci90"]
         word = f"within {e['margin_percent']:g} %" if e["equivalent"] else f"not shown within {e['margin_percent']:g} %"
@@ -66,7 +66,7 @@ def print_cold_warm(record: dict) -> None:
               f"{e['provable_percent']:.0f} %: {word}")  # fmt: skip
     c = record["curves"]
     if c:
-        p = "" if c["p_value"] is None else f"; p = {c['p_value']:.2g} that pairs differ more"
+        p = "" if c["p_value"] is None else f"; p = {c['p_value']:.2g} for larger differences within pairs"
         print(f"  whole curves: pairs {', '.join(f'{d:.2f}' for d in c['pairs'])}; other neighbours "
               f"{min(c['others']):.2f} to {max(c['others']):.2f}{p}" if c["others"] else "  whole curves: no other neighbours")  # fmt: skip
 
@@ -74,7 +74,7 @@ def print_cold_warm(record: dict) -> None:
 def print_two(record: dict) -> None:
     print(f"  {'figure':24s} {record['first']:>22s} {record['second']:>22s}   difference")
     for r in record["figures"]:
-        sigma = "" if r["sigma_difference"] is None else f" +- {r['sigma_difference']:.2g}"
+        sigma = "" if r["sigma_difference"] is None else f" ± {r['sigma_difference']:.2g}"
         print(
             f"  {r['figure']:24s} {r['first']:+22.4g} {r['second']:+22.4g}   {r['difference']:+.3g}{sigma} {r['unit']}"
         )
@@ -88,11 +88,8 @@ def value_of(entry, figure: str, basis: str | None) -> float | None:
 
 
 def doubts_by_event(entries) -> dict[str, str]:
-    """Every doubt once, the events' own dates left out, with how many events have it."""
-    import re
+    """Doubts, with how many events have them; those that differ only in numbers and dates count as one."""
+    from ...kit.doubts import grouped
 
-    found: dict[str, list[str]] = {}
-    for e in entries:
-        for d in (re.sub(r" on \d{4}-\d\d-\d\d", "", d) for d in e.doubts):
-            found.setdefault(d, []).append(e.event)
-    return {d: names[0] if len(names) == 1 else f"{len(names)} events" for d, names in found.items()}
+    names = {id(d): e.event for e in entries for d in e.doubts}
+    return {str(d): names[id(d)] if n == 1 else f"{n} events" for d, n in grouped(d for e in entries for d in e.doubts)}

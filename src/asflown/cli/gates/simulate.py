@@ -6,11 +6,22 @@ from pathlib import Path
 
 import typer
 
-from .options import JSON
-from .output import print_json, provenance, say
+from ...kit.doubts import Doubts, Kind, Severity
+from ..job import Job
+from ..options import JSON
+from ..output import say
+
+#: From burn to burn, where a start is given.
+_TEN_DAYS_NS = 864_000_000_000_000
+
+ASSUMED = Kind(
+    "cli.assumed-burns", Severity.NOTE,
+    "sizes are drawn log-uniformly and the orbit determination's sigmas are assumed: the paper gives neither",
+)  # fmt: skip
 
 
 def simulate(
+    context: typer.Context,
     by: str = typer.Option("rcs/2012-1", "--by", help="A model of the history, biases as found."),
     count: int = typer.Option(
         None, "--count", min=1, max=100_000, help="How many; as many as the 2012-1 model was made of unless given."
@@ -21,7 +32,7 @@ def simulate(
         None, "--start", help="UTC of the first burn; the others follow every ten days. Without it there are no times."
     ),
     seed: int = typer.Option(0, "--seed", min=0),
-    out: Path = typer.Option(..., "--out", help="The table (CSV)."),
+    table: Path = typer.Option(..., "--out", help="The table (CSV)."),
     json: bool = JSON,
 ) -> None:
     """Maneuvers of log-uniform sizes, executed by a model and reconstructed by an assumed orbit determination."""
@@ -29,15 +40,16 @@ def simulate(
 
     import numpy as np
 
-    from ..kit.errors import BadInput
-    from ..kit.files import check_place
-    from ..kit.quantities import quantity
-    from ..kit.timeline import utc_to_tai_ns
-    from ..maneuvers.history import RCS, past_model
-    from ..maneuvers.write import write_maneuvers
-    from ..sim.maneuver_sets import MAIN_ENGINE_SET, RCS_SET, execute
+    from ...kit.errors import BadInput
+    from ...kit.files import check_place
+    from ...kit.quantities import quantity
+    from ...kit.timeline import utc_to_tai_ns
+    from ...maneuvers.history import RCS, past_model
+    from ...maneuvers.write import write_maneuvers
+    from ...sim.maneuver_sets import MAIN_ENGINE_SET, RCS_SET, execute
 
-    check_place(out)
+    job = Job(context)
+    check_place(table)
     past = past_model(by)
     burns = RCS_SET if past.engine == RCS else MAIN_ENGINE_SET
     burns = replace(burns, count=count or burns.count)
@@ -49,14 +61,11 @@ def simulate(
         short[-last:] = share
     made = execute(past.model, burns, seed, weaker=short)
     if start is not None:
-        made = replace(made, tai_ns=utc_to_tai_ns(start) + 864_000_000_000_000 * np.arange(burns.count))
-    write_maneuvers(made, out)
-    doubts = ["sizes are log-uniform and the orbit determination is assumed: no paper gives either"]
-    if json:
-        print_json({
-            "command": "gates simulate", "out": str(out), "count": burns.count, "engine": burns.engine, "truth": past.model.record(),
-            "weaker": share, "last": last if weaker else 0, "doubts": doubts,
-            "provenance": provenance({}, {"by": by, "count": count, "weaker": weaker, "last": last, "start": start}, seed),
-        })  # fmt: skip
-        return
-    say(f"wrote {out}")
+        made = replace(made, tai_ns=utc_to_tai_ns(start) + _TEN_DAYS_NS * np.arange(burns.count))
+    write_maneuvers(made, table)
+    record = {
+        "out": str(table), "count": burns.count, "engine": burns.engine, "truth": past.model.record(), "weaker": share,
+        "last": last if weaker else 0,
+    }  # fmt: skip
+    doubts = Doubts([ASSUMED()]) + past.doubts.passed_on_by("model")
+    job.tell(record, doubts, lambda: say(f"wrote {table}"), seed=seed)

@@ -1,0 +1,150 @@
+"""The tensor by a fit of the whole motion: method ``consistent``."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...dynamics.rigid_body import tensor_of
+from ...kit.doubts import Doubt, Kind, Severity
+from ...kit.rotations import rotation
+from .contradictions import MOST_STEPS
+from .levels import first_levels
+from .linear import WHEEL
+from .prior import possible, prior_for
+from .result import Answer, Evidence
+from .slews import find_slews
+from .steps import momentum_step
+from .whole_motion import fit_slews
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..subject import Subject
+    from .excitation import Excitation
+    from .record import SlewRecord
+    from .whole_motion import SlewFit
+
+#: A step of momentum is kept where it is this large, squared, in its own covariance: of 3 degrees of freedom, chance gives it
+#: once in 1e8, at each of some hundred instants tried.
+_STEP_KEPT = 40.0
+#: Time stamps apart by more than this are spoken of. [s]
+_LATE_S = 0.05
+#: Wheel readings that miss the fit by so many times their own scatter are not explained by it.
+_UNEXPLAINED = 4.0
+
+STAMPED_APART = Kind(
+    "inertia.stamped-apart", Severity.CAUTION,
+    "the {channels} are stamped {apart_s:.2f} s {how} against {against}: the fit corrects for it",
+    "Check the time stamps of these channels.",
+)  # fmt: skip
+OUTLIERS = Kind(
+    "inertia.outliers", Severity.CAUTION, "{outliers} readings are outliers and are left out",
+    "Look at the residuals: --plot.",
+)  # fmt: skip
+NOT_CONVERGED = Kind(
+    "inertia.not-converged", Severity.CAUTION,
+    "the fit did not converge in {rounds} rounds: its sigmas may be too small", "Take a shorter window.",
+)  # fmt: skip
+UNEXPLAINED = Kind(
+    "inertia.unexplained", Severity.SUSPECT,
+    "wheel readings miss the fit by {ratio:.0f} times their own scatter: momentum is not conserved as modelled. A wheel mistaken "
+    "for another, a wrong axis or spin inertia, or a torque that is not modelled would do that",
+    "Check the wheels' axes and spin inertia, and look at the residuals: --plot.",
+)  # fmt: skip
+
+
+def by_whole_motion(
+    subject: Subject,
+    record: SlewRecord,
+    excited: Excitation,
+    frame: str,
+    progress: Callable[[str], None] | None,
+) -> Answer:
+    """Raises BadInput where the slews do not identify the tensor and nothing else is known of it."""
+    prior, leaning = prior_for(subject, excited)
+    fit_of = partial(fit_slews, frame=frame, prior=prior, seen=excited.seen, progress=progress)
+    fit = fit_of(record)
+    for _ in range(0 if record.wanders else MOST_STEPS):
+        at, square = momentum_step(fit, prior)
+        if square < _STEP_KEPT:
+            break
+        fit = fit_of(fit.record.split_at(at))
+    layout = fit.layout
+    tensor, torque = layout.TENSOR, layout.torque
+    elements, impossible = possible(fit.beta[tensor], np.linalg.inv(fit.covariance[tensor, tensor]))
+    evidence = _evidence(fit)
+    by = fit.by_scale[tensor]
+    return Answer(
+        method="consistent",
+        elements=elements,
+        covariance=fit.covariance[:6, :6],
+        by_scale=np.stack([tensor_of(by[:, 0]), tensor_of(by[:, 1])]),
+        excitation=excited,
+        torque_Nm=fit.beta[torque],
+        torque_sigma_Nm=fit.sigma[torque],
+        frame=frame,
+        slews=tuple(find_slews(evidence.time_s, evidence.omega_rad_s, fit.levels.rate)),
+        evidence=evidence,
+        settings=_settings(fit),
+        doubts=[*fit.record.doubts, *leaning, *impossible, *_fit_doubts(fit)],
+    )
+
+
+def _settings(fit: SlewFit) -> dict:
+    """What was fitted besides: noise levels, time offsets, biases."""
+    layout, noise, beta, sigma = fit.layout, fit.levels, fit.beta, fit.sigma
+    rates, attitude = fit.record.has_rates, fit.record.has_attitude
+    late = layout.skew_rates
+    return {
+        "wheel_noise": noise.wheel,
+        "rate_noise_rad_s": noise.rate if rates else None,
+        "attitude_noise_rad": noise.attitude if attitude else None,
+        "attitude_coloured_rad": noise.coloured if attitude else None,
+        "attitude_coloured_s": noise.coloured_s if attitude else None,
+        "wheels_late_s": -beta[layout.skew_wheels],
+        "wheels_late_sigma_s": sigma[layout.skew_wheels],
+        "rates_late_s": None if late is None else -beta[late],
+        "rates_late_sigma_s": None if late is None else sigma[late],
+        "wander_Nms_per_root_s": noise.wander or None,
+        "rate_bias_rad_s": None if layout.bias is None else beta[layout.bias],
+        "arcs": len(fit.record.arcs),
+        "left_out": int((~fit.weighted.kept).sum()),
+        "rounds": fit.rounds,
+        "converged": fit.converged,
+    }
+
+
+def _evidence(fit: SlewFit) -> Evidence:
+    """Residual momentum at the wheels' instants, inertial axes, with the smoothed rates and what the wheels held."""
+    m, model = fit.record.momentum, fit.weighted.model
+    rows = model.kind == WHEEL
+    left = np.empty(len(m.time_s))
+    left[model.source[rows]] = fit.residual[rows]
+    time_s, total, _ = m.vectors(left)
+    at = time_s + fit.beta[fit.layout.skew_wheels]
+    residual = rotation(fit.motion.at(at).q_NB).apply(total)
+    omega = fit.motion.moved(fit.smoothed.mean).at(at).omega_B
+    held = m.vectors(m.value_Nms)[1]
+    return Evidence(fit.record.zero_s + time_s, omega, held, residual, np.ones(len(time_s), bool))
+
+
+def _fit_doubts(fit: SlewFit) -> list[Doubt]:
+    layout, beta, sigma = fit.layout, fit.beta, fit.sigma
+    against = "the attitude" if fit.record.has_attitude else "the body rates"
+    doubts = [
+        STAMPED_APART(channels=name, apart_s=abs(beta[k]), how="late" if beta[k] < 0 else "early", against=against)
+        for name, k in (("wheel rates", layout.skew_wheels), ("body rates", layout.skew_rates))
+        if k is not None and abs(beta[k]) > max(_LATE_S, 4 * sigma[k])
+    ]
+    out = int((~fit.weighted.kept).sum())
+    if out:
+        doubts.append(OUTLIERS(outliers=out))
+    if not fit.converged:
+        doubts.append(NOT_CONVERGED(rounds=fit.rounds))
+    scatter = first_levels(fit.record).wheel
+    if fit.levels.wheel > _UNEXPLAINED * scatter:
+        doubts.append(UNEXPLAINED(ratio=fit.levels.wheel / scatter))
+    return doubts

@@ -1,0 +1,73 @@
+"""Whether the total momentum stepped somewhere: a thruster that no channel reports."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...kit.regressed import run
+from .likelihood import Around, solved
+from .linear import WHEEL
+from .whole_motion import cadence_s, prior_of_all
+
+if TYPE_CHECKING:
+    from .prior import Prior
+    from .whole_motion import SlewFit
+
+#: Steps of momentum: tried at so many readings, then between the best one's neighbours, so many in one pass; not nearer to an
+#: arc's ends than so many readings.
+_STEPS_TRIED, _STEPS_BETWEEN, _STEPS_AT_ONCE, _FEWEST_BESIDE = 120, 11, 20, 10
+
+
+def momentum_step(fit: SlewFit, prior: Prior | None = None) -> tuple[float, float]:
+    """Where the total momentum most likely stepped, and that step's square in its own covariance (chi square of 3).
+
+    As if a step were let in at each of many instants in turn, motion and levels held: all in one filter pass, then again
+    between the neighbours of the best, down to the wheels' cadence.  Residuals would not show it: rates and coloured
+    attitude error give way first."""
+    information, centre = prior_of_all(fit.layout, prior)
+    around = Around(information, centre - fit.weighted.model.about.beta)
+    momentum, cadence = fit.record.momentum, cadence_s(fit.record)
+    best = 0.0, 0.0
+    for arc, (_, stop) in enumerate(fit.record.arcs):
+        times = np.unique(momentum.time_s[momentum.arc == arc])
+        if len(times) <= 2 * _FEWEST_BESIDE:
+            continue
+        inside = times[_FEWEST_BESIDE : len(times) - _FEWEST_BESIDE]
+        low, high = inside[0], min(inside[-1], stop)
+        # denser where readings are
+        tried = np.unique(inside[np.linspace(0, len(inside) - 1, _STEPS_TRIED).astype(int)])
+        while True:
+            squares = _steps_told(fit, arc, tried, around)
+            k = int(np.argmax(squares))
+            best = max(best, (float(squares[k]), float(tried[k])))
+            near = tried[max(k - 1, 0)], tried[min(k + 1, len(tried) - 1)]
+            if near[1] - near[0] <= 2 * cadence:
+                break
+            tried = np.linspace(max(near[0], low), min(near[1], high), _STEPS_BETWEEN)
+    return best[1], best[0]
+
+
+def _steps_told(fit: SlewFit, arc: int, at_s: np.ndarray, around: Around) -> np.ndarray:
+    """Chi square of a step of an arc's momentum at each instant (K,), each alone."""
+    z, p, momentum = fit.weighted.model, fit.layout.size, fit.record.momentum
+    steps = fit.weighted.steps(fit.levels)
+    wheels = np.flatnonzero(z.kind == WHEEL)
+    when = np.where(momentum.arc == arc, momentum.time_s, -np.inf)[z.source[wheels]]
+    columns = z.Z[wheels, fit.layout.momentum(arc)]
+    squares = []
+    for group in np.array_split(at_s, np.ceil(len(at_s) / _STEPS_AT_ONCE)):
+        extra = np.zeros((len(z.y), 3 * len(group)))
+        after = (when[:, None] >= group)[:, :, None]
+        extra[wheels] = (columns[:, None] * after).reshape(len(wheels), -1)
+        f = run(replace(steps, Z=np.column_stack([z.Z[:, :p], extra])))
+        told = f.information
+        delta, _, slope = solved(f, fit.layout, around)
+        score = told[p + 1 :, 0] - told[p + 1 :, 1 : p + 1] @ delta
+        information = told[p + 1 :, p + 1 :] - told[p + 1 :, 1 : p + 1] @ slope
+        for k in range(len(group)):
+            own = slice(3 * k, 3 * k + 3)
+            squares.append(score[own] @ np.linalg.solve(information[own, own], score[own]))
+    return np.array(squares)

@@ -1,0 +1,149 @@
+"""What is not sure of a thrust: what the records do not separate, and what contradicts the thrust predicted."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...craft.model import STALE_NS
+from ...kit.doubts import Doubt, Kind, Severity
+from ...kit.timeline import NS, utc_label
+from ...telemetry.channels import AXES
+from ..firing import Source
+from ..subject import stopped
+from .fit import CENTER, FALL_TIME
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from ...craft.model import Craft
+    from ...telemetry.telemetry import Telemetry
+    from ..firing import Firings, Priors
+    from .fit import Fit
+
+#: Sigma of the mean, as a share, beyond which the records say little.
+_HARDLY = 0.2
+#: Correlation beyond which thrust and fall time are not separated; share of a prior's sigma that data must beat.
+_TIED, _UNTOLD = 0.95, 0.8
+#: The prior on the fall time decides where its sigma falls by less than this factor.
+_BY_PRIOR = 0.5
+#: Share of the sigma of a thrust over the mean that is the centre of mass's, beyond which the two are not separated.
+_MIXED = 0.75
+#: Variances widened by more than this factor are told.
+_WIDENED = 2.0
+#: A longer fall time whose effect is told. [s]
+_LONGER = 0.01
+#: Records this far apart may have different thrusts. [days]
+_APART_DAYS = 60.0
+#: A prediction that is not stale is taken to be good to this share, assumed.
+_PREDICTED_SHARE = 0.05
+#: Two branches' thrusts are not further apart than this share; assumed.
+_NO_BRANCH = 0.3
+
+HARDLY_KNOWN = Kind(
+    "thrust.hardly-known", Severity.CAUTION,
+    "the records say little about the thrust (sigma {percent:.0f} %): the thrusters gave little torque, or fired little",
+    "Add a wheel biasing; a burn needs its accelerometer and --mass.",
+)  # fmt: skip
+FALL_TIME_TIED = Kind(
+    "thrust.fall-time-tied", Severity.CAUTION,
+    "these pulses hardly separate thrust and fall time (correlation {correlation:+.4f}): a fall time 10 ms longer would change "
+    "the mean by {change_N:+.3f} N",
+    "Add a burn with the accelerometer on, or longer pulses.",
+)  # fmt: skip
+FALL_TIME_BY_PRIOR = Kind(
+    "thrust.fall-time-by-prior", Severity.CAUTION,
+    "these pulses hardly separate thrust and fall time (correlation {correlation:+.4f}), and the prior on the fall time decides: a "
+    "fall time 10 ms longer would change the mean by {change_N:+.3f} N",
+    "Add a burn with the accelerometer on, or longer pulses; give a better fall time with --fall-time and --fall-sigma.",
+)  # fmt: skip
+WEAK_OR_CENTER = Kind(
+    "thrust.weak-or-center-of-mass", Severity.CAUTION,
+    "a weak thruster and a shifted centre of mass look alike for {thrusters}",
+    "If the centre of mass is known better, give its sigma with --cm-sigma.",
+)  # fmt: skip
+CENTER_BY_PRIOR = Kind(
+    "thrust.center-of-mass-by-prior", Severity.NOTE,
+    "the records say little about the centre of mass along {axis}: it is the value assumed beforehand",
+)  # fmt: skip
+MISFIT = Kind(
+    "thrust.misfit", Severity.SUSPECT,
+    "the residuals are {ratio:.1f} times the noise assumed, and sigmas are widened by as much: swinging booms or propellant, a leak, "
+    "or thrusters unlike the model",
+    "Look at what is not explained (--plot), and look for a leak (asflown leak).",
+)  # fmt: skip
+RECORDS_APART = Kind(
+    "thrust.records-apart", Severity.CAUTION,
+    "the records lie {days:.0f} days apart and are given one thrust, which falls as propellant is used",
+    "Estimate them one by one.",
+)  # fmt: skip
+OLD_PREDICTION = Kind(
+    "thrust.old-prediction", Severity.CAUTION, "the predicted thrust is the last one known, of {date}: it has fallen since",
+)  # fmt: skip
+_OFF = "the mean is {percent:+.0f} % from the predicted {predicted_N:.3g} N, whose sigma is assumed to be {share_percent:.0f} %: "
+OFF_PREDICTION = Kind(
+    "thrust.off-prediction", Severity.SUSPECT,
+    _OFF + "the other branch, with its own thrust in the same places, would look like this",
+    "Check which branch was in use.",
+)  # fmt: skip
+FAR_FROM_PREDICTION = Kind(
+    "thrust.far-from-prediction", Severity.SUSPECT, _OFF + "neither blow-down nor the other branch explains so much",
+    "Check units and names of the on-times, inertia and centre of mass.",
+)  # fmt: skip
+
+
+def joint_doubts(fit: Fit, priors: Priors, records: list[Firings]) -> Iterable[Doubt]:
+    """Of the joint method."""
+    mean, sigma = fit.mean()
+    if sigma > _HARDLY * abs(mean):
+        yield HARDLY_KNOWN(percent=100 * sigma / abs(mean))
+    correlation = fit.correlation(fit.mean_weights, FALL_TIME)
+    if abs(correlation) > _TIED:
+        fall_sigma_s = fit.sigma(FALL_TIME)
+        kind = FALL_TIME_BY_PRIOR if fall_sigma_s > _BY_PRIOR * priors.fall_sigma_s else FALL_TIME_TIED
+        yield kind(correlation=correlation, change_N=correlation * sigma / fall_sigma_s * _LONGER)
+    mixed = []
+    for n in fit.fired:
+        weights = fit.ratio_weights(n)
+        if fit.share(weights, Source.CENTER) > _MIXED * fit.combination(weights)[1]:
+            mixed.append(n)
+    if mixed:
+        yield WEAK_OR_CENTER(thrusters=mixed)
+    for axis, center, before in zip(AXES, CENTER, priors.center_sigma_m, strict=True):
+        if fit.sigma(center) > _UNTOLD * before:
+            yield CENTER_BY_PRIOR(axis=axis)
+    if fit.widened > _WIDENED:
+        yield MISFIT(ratio=float(np.sqrt(fit.misfit)))
+        for f in records:
+            yield from stopped(f.subject)
+
+
+def doubts_of(records: list[Firings]) -> list[Doubt]:
+    """Those of every record; of several, each with its record's name."""
+    if len(records) == 1:
+        return list(records[0].doubts)
+    return [
+        d.of_record(f.telemetry.source or f"record {k}") for k, f in enumerate(records, 1) for d in f.doubts
+    ]  # fmt: skip
+
+
+def doubts_of_dates(telemetry: list[Telemetry], craft: Craft, mean_N: float, sigma_N: float | None) -> Iterable[Doubt]:
+    """What the dates of the records say against one thrust, or against the one predicted."""
+    dated_ns = [t.epoch_ns for t in telemetry if t.dated]
+    if not dated_ns:
+        return
+    apart_days = (max(dated_ns) - min(dated_ns)) / NS / 86_400
+    if apart_days > _APART_DAYS:
+        yield RECORDS_APART(days=apart_days)
+    if not craft.thrust_history:
+        return
+    predicted = craft.thrust_at(dated_ns[0])
+    last = max(h.date for h in craft.thrust_history)
+    if dated_ns[0] - last > STALE_NS:
+        yield OLD_PREDICTION(date=utc_label(last)[:10])
+    elif sigma_N is not None:
+        off, expected = mean_N - predicted, np.hypot(sigma_N, _PREDICTED_SHARE * predicted)
+        if abs(off) > 2 * expected:
+            kind = FAR_FROM_PREDICTION if abs(off) > _NO_BRANCH * predicted else OFF_PREDICTION
+            yield kind(percent=100 * off / predicted, predicted_N=predicted, share_percent=100 * _PREDICTED_SHARE)

@@ -1,0 +1,85 @@
+"""What is not sure of a wheel's drag and use."""
+
+from __future__ import annotations
+
+from ...kit.doubts import Kind, Severity
+
+_MOTOR_OFF = "If the motor was off: --run-down {wheel}, with --start and --stop."
+
+
+def _no_run_down(what: str, cause: str) -> Kind:
+    """A steady slowing that something else than a bearing explains."""
+    return Kind(
+        f"wheels.slows-{what}", Severity.NOTE,
+        "wheel {wheel} slows steadily from {start_s:.0f} to {stop_s:.0f} s (spans like this: {spans}), but "
+        f"{cause}: this is not used as a run-down", _MOTOR_OFF,
+    )  # fmt: skip
+
+
+SLOWS_BY_COMMAND = _no_run_down("by-command", "the commanded torque explains it")
+SLOWS_AS_DRIVEN = _no_run_down("as-driven", "as a motor or a steady torque on the body would slow it")
+SLOWS_WITH_OTHERS = _no_run_down(
+    "with-others", "other wheels change with it, as a torque on the body would change them"
+)
+FOUND_BY_SHAPE = Kind(
+    "wheels.run-down-by-shape", Severity.NOTE,
+    "wheel {wheel}: a run-down is assumed from {start_s:.0f} to {stop_s:.0f} s (run-downs in all: {run_downs}): only a bearing "
+    "explains the wheel's course, and nothing in the file says that the motor was off",
+)  # fmt: skip
+MISFIT = Kind(
+    "wheels.misfit", Severity.SUSPECT,
+    "wheel {wheel} does not slow exactly as Coulomb and viscous drag would have it (slow residuals {ratio:.1f} times the noise): "
+    "the sigmas are widened by that factor",
+    "Look at the run-downs: --plot.",
+)  # fmt: skip
+PER_SPIN_INERTIA = Kind(
+    "wheels.per-spin-inertia", Severity.NOTE,
+    "the spin inertia of wheel {wheel} is not known: its drag is given per unit spin inertia", "Give spin_inertia in the craft file.",
+)  # fmt: skip
+COMMAND_INCOMPLETE = Kind(
+    "wheels.command-incomplete", Severity.CAUTION,
+    "wheel {wheel}: drag from the commanded torque is the momentum that the wheel gains too little by it; what its own "
+    "electronics compensate is not included",
+    "A run-down shows all of the drag.",
+)  # fmt: skip
+COMMAND_SHOWS_NONE = Kind(
+    "wheels.command-shows-none", Severity.NOTE,
+    "wheel {wheel}: the commanded torque shows no drag ({drag_Nm:.1g} ± {drag_sigma_Nm:.1g} N m): something compensates it",
+    "A run-down shows the drag.",
+)  # fmt: skip
+NOT_SEPARABLE = Kind(
+    "wheels.not-separable", Severity.NOTE,
+    "wheel {wheel}, {basis}: the range of speeds is too narrow to separate Coulomb from viscous drag; their sum is known, at "
+    "{mean_rate_rad_s:.1f} rad/s",
+    "Take a run-down over a wider range of speeds.",
+)  # fmt: skip
+NEGATIVE_PART = Kind(
+    "wheels.negative-part", Severity.SUSPECT,
+    "wheel {wheel}, {basis}: Coulomb or viscous drag is negative, so something else acts too",
+)  # fmt: skip
+BASES_DIFFER = Kind(
+    "wheels.bases-differ", Severity.SUSPECT,
+    "wheel {wheel}: drag from {basis} and from {best} differ by {difference_Nm:+.2g} N m at {mean_rate_rad_s:.0f} rad/s",
+)  # fmt: skip
+IN_GAPS = Kind(
+    "wheels.in-gaps", Severity.NOTE,
+    "wheel {wheel}: {gaps_s:.0f} s lie in gaps, so revolutions, dwell and zero crossings are lower bounds",
+)  # fmt: skip
+OVER_LIMIT = Kind(
+    "wheels.over-limit", Severity.SUSPECT,
+    "wheel {wheel} exceeds its rate limit: {largest_rad_s:.1f} of {limit_rad_s:.1f} rad/s",
+    "Check the unit of its rate, and rate_limit in the craft file.",
+)  # fmt: skip
+DRAG_UNKNOWN = Kind(
+    "wheels.drag-unknown", Severity.NOTE,
+    "drag is not known of wheel {wheels}: there is no run-down, and in the loop the motor compensates drag, so that the rate alone "
+    "does not show it",
+    "Add wheel_drag_torque_<WHEEL> or control_torque_x|y|z, or take a record with a run-down.",
+)  # fmt: skip
+ON_THE_WHEEL = Kind(
+    "wheels.sign-on-the-wheel", Severity.NOTE,
+    "{channel} has the sign opposite to the rate: it is taken as the torque on the wheel",
+)  # fmt: skip
+MAGNITUDE = Kind(
+    "wheels.sign-magnitude", Severity.NOTE, "{channel} has one sign for both senses of rotation: it is taken as a magnitude"
+)  # fmt: skip

@@ -1,0 +1,91 @@
+"""One record's wheels: their rates, what the craft file says of them, and the torque commanded of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...kit.errors import BadInput, some_of
+from ...telemetry.attitude import together
+from ...telemetry.channels import AXES
+from .run_downs import Finder
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from ...craft.model import Craft, CraftAt, Wheel
+    from ...telemetry.telemetry import Telemetry
+
+#: Condition number of three wheels' axes beyond which their shares of a torque are not told.
+_ALIGNED = 1e3
+
+
+@dataclass(frozen=True)
+class RecordedWheels:
+    """``finders``: the course of each wheel that has a rate; ``run_down``: wheels whose motor is off, as the user says."""
+
+    telemetry: Telemetry
+    craft: Craft
+    now: CraftAt
+    finders: dict[str, Finder]
+    run_down: frozenset[str]
+
+    def described(self, name: str) -> Wheel:
+        """As it is in service then; a spare one as it was described last."""
+        return self.now.wheel(name) or [w for w in self.craft.wheels if w.name == name][-1]
+
+    def commanded(self, name: str) -> tuple[np.ndarray, np.ndarray] | None:
+        """Seconds (N,) and the torque commanded of a wheel's motor (N,) [N m]; None where that is not known.
+
+        Three wheels share a torque on the body in one way only; with four it depends on software not described."""
+        names = [w.name for w in self.now.wheels]
+        if self._commanded is None or name not in names:
+            return None
+        t, torque = self._commanded
+        return t, torque[:, names.index(name)]
+
+    @cached_property
+    def _commanded(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Of all three wheels in service, (N, 3)."""
+        tlm, wheels = self.telemetry, self.now.wheels
+        if not tlm.has_axes("control_torque") or len(wheels) != 3:
+            return None
+        axes = np.array([w.axis for w in wheels], float).T
+        if np.linalg.cond(axes) > _ALIGNED:
+            return None
+        tai_ns, torque = together(tlm, [f"control_torque_{a}" for a in AXES])
+        return tlm.seconds(tai_ns), -torque @ np.linalg.inv(axes).T
+
+
+def record_of(telemetry: Telemetry, craft: Craft, run_down: Collection[str]) -> RecordedWheels:
+    """Raises BadInput for telemetry without wheel rates, a wheel that the craft does not have, and one in ``run_down`` without
+    a rate."""
+    names = telemetry.members("wheel_rate")
+    if not names:
+        raise BadInput(
+            "there are no wheel rates, without which nothing can be said of wheels",
+            file=telemetry.source or None,
+            channel="wheel_rate_<WHEEL>",
+            remedy=f"The telemetry holds: {some_of(telemetry.channels)}.",
+        )
+    for name in names:
+        if name not in craft.wheel_names:
+            raise BadInput(
+                f"{craft.name} has no wheel {name!r}",
+                file=telemetry.source or None,
+                channel=f"wheel_rate_{name}",
+                remedy=f"Its wheels: {some_of(craft.wheel_names)}. Rename the column, or name the right --craft.",
+            )
+    for name in run_down:
+        if name not in names:
+            raise BadInput(
+                f"no rate of wheel {name!r}, whose run-down this is said to be",
+                file=telemetry.source or None,
+                remedy=f"Wheels with a rate here: {some_of(names)}.",
+            )
+    channels = {n: telemetry.channel(f"wheel_rate_{n}") for n in names}
+    finders = {n: Finder(c, telemetry.seconds(c.usable.tai_ns)) for n, c in channels.items()}
+    return RecordedWheels(telemetry, craft, craft.at(telemetry.date_ns), finders, frozenset(run_down))
