@@ -27,7 +27,7 @@ import numpy as np
 
 from asflown.craft.load import load_craft
 from asflown.dynamics.pulses import Valve
-from asflown.estimate.firing.priors import CENTER_SIGMA, FALL, FALL_SIGMA, MASS_SHARE, UNLIKE, priors_for
+from asflown.estimate.firing.priors import CENTER_SIGMA, FALL, FALL_SIGMA, MASS_SHARE, UNLIKE, thrust_priors
 from asflown.estimate.thrust.methods import thrust
 from asflown.sim.flight.closed_loop import fly
 from asflown.sim.scenario.scenario import load_scenario
@@ -98,7 +98,7 @@ def one(seed: int, alike: bool, unlike: float) -> dict:
         ]
         steady, flew = impulse @ F / impulse.sum(), impulse.sum() / valve.effective(lengths).sum()
         records = [thinned(flights[k].telemetry, count, counted) for k in keys]
-        r = thrust(records, BASE, priors=priors_for(BASE, mass_kg=MASS, unlike=unlike))
+        r = thrust(records, BASE, priors=thrust_priors(BASE, mass_kg=MASS, unlike=unlike))
         singles = [(r.thrust_N[t.name] - f) / r.thrust_sigma_N[t.name] for t, f in zip(BASE.thrusters, F, strict=True) if r.thrust_N[t.name] is not None]  # fmt: skip
         errors = np.array([r.mean_thrust_N - steady, r.mean_thrust_N - flew, r.fall_time_s - fall, *(np.array(r.center_of_mass_m) - center)[:2]])  # fmt: skip
         sigmas = np.array(

@@ -147,7 +147,7 @@ def architecture_page() -> str:
         "# Architecture",
         "",
         "Data flow one way: telemetry, estimate, trends, report. No import runs upward, and no module imports itself through others.",
-        "`tests/test_house.py` holds the arrows; this page is made from the imports (`python docs/pages.py`).",
+        "An arrow means: imports. `tests/test_house.py` holds the arrows; this page is made from the imports (`python docs/pages.py`).",
         "",
         "## Rooms",
         "",

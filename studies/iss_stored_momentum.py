@@ -27,7 +27,7 @@ from asflown.kit.rotations import rotation
 from asflown.kit.timeline import NS, segments
 from asflown.plots.figure import BLUE, GREY, ORANGE, RED, breaks, new_figure, save
 from asflown.telemetry.attitude import together
-from asflown.telemetry.screening import noise_sigma
+from asflown.telemetry.screening import sample_noise
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("ASFLOWN_FLIGHT_DATA", ROOT.parent / "shared" / "data"))
@@ -145,7 +145,7 @@ def main(folder: Path | None = None) -> None:
         known = np.isfinite(result.torque_Nm).all(axis=1)
         for j, axis in enumerate(AXES):
             T, g = result.torque_Nm[known, j], np.interp(result.time_s[known], at, gravity[:, j])
-            noise = noise_sigma(telemetry.channel(f"body_rate_{axis}"))
+            noise = sample_noise(telemetry.channel(f"body_rate_{axis}"))
             print(f"  {2 * half:4.0f} s   {axis}    {T.mean():+6.2f} {T.std():6.2f} {np.median(result.torque_sigma_Nm[known, j]):12.2f}"
                   f" {noise:20.1e} {I_B[j, j] * noise * slope_noise(half):17.2f} {g.mean():+18.2f} {g.std():6.2f}"
                   f" {np.corrcoef(T, g)[0, 1]:+10.2f}")  # fmt: skip

@@ -200,14 +200,18 @@ def test_every_option_is_documented():
     "file", [Path("README.md"), *(p.relative_to(DOCS.parent) for p in sorted(DOCS.rglob("*.md")))], ids=str
 )
 def test_python_blocks_run(file, tmp_path, monkeypatch):
-    """In one namespace a page, in a folder with flight.csv, a simulated deployment."""
+    """In one namespace a page, in a folder with flight.csv, a simulated deployment, and trends.db."""
     blocks = code_blocks((DOCS.parent / file).read_text(encoding="utf-8"), "python")
     if not blocks:
         pytest.skip("no Python on this page")
     from asflown.telemetry.tables import write_table
-    from flights import flown
+    from asflown.trends.entries import history_entries
+    from asflown.trends.store import TrendStore
+    from flights import CASSINI, flown
 
     write_table(flown("cover-deploy").telemetry, tmp_path / "flight.csv")
+    with TrendStore.open(tmp_path / "trends.db") as store:
+        store.add(history_entries(CASSINI))
     monkeypatch.chdir(tmp_path)
     names: dict = {}
     for block in blocks:

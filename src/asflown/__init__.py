@@ -41,6 +41,8 @@ _PUBLIC = {
     "leak_known": "asflown.estimate.leak",
     "thrust": "asflown.estimate.thrust",
     "ThrustResult": "asflown.estimate.thrust",
+    "thrust_priors": "asflown.estimate.firing",
+    "Priors": "asflown.estimate.firing",
     "wheels": "asflown.estimate.wheels",
     "WheelsResult": "asflown.estimate.wheels",
     "inertia": "asflown.estimate.inertia",
@@ -55,6 +57,7 @@ _PUBLIC = {
     "write_flight": "asflown.sim.flight",
     "figure_of_merit": "asflown.trends.entries",
     "TrendStore": "asflown.trends.store",
+    "save_figure": "asflown.plots",
     "Mission": "asflown.sim.mission",
     "load_mission": "asflown.sim.mission",
     "fly_mission": "asflown.sim.mission",
@@ -124,6 +127,7 @@ if TYPE_CHECKING:
     from asflown.dynamics.trajectory import Trajectory
     from asflown.estimate.density import DensityResult, density
     from asflown.estimate.external import ExternalTorqueResult, external_torque
+    from asflown.estimate.firing import Priors, thrust_priors
     from asflown.estimate.gates import (
         GatesJudgement,
         GatesPatch,
@@ -165,6 +169,7 @@ if TYPE_CHECKING:
     from asflown.maneuvers.plan import load_plan
     from asflown.maneuvers.table import Maneuvers, load_maneuvers
     from asflown.maneuvers.write import write_maneuvers
+    from asflown.plots import save_figure
     from asflown.sim.flight import fly, write_flight
     from asflown.sim.mission import Mission, fly_mission, load_mission
     from asflown.sim.scenario import Scenario, load_scenario

@@ -237,7 +237,7 @@ def test_law_a_list_with_one_impossible_entry_keeps_none(url):
         "shape": replace(a, curves=(Curve("c", "s", t, t[:2]),)),
         "differ": replace(a, curves=(Curve("c", "s", t, t, np.zeros((3, 1))),)),
         "NUL": replace(a, note="a\0b"),
-        "half a character": replace(a, doubts=Doubts(["\ud800"])),
+        "unpaired surrogate": replace(a, doubts=Doubts(["\ud800"])),
         "without craft or event": replace(a, event=""),
         "the date '2005-001'": replace(a, date="2005-001"),
     }

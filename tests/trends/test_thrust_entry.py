@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from asflown.craft.load import load_craft
-from asflown.estimate.firing.priors import priors_for
+from asflown.estimate.firing.priors import thrust_priors
 from asflown.estimate.thrust.methods import thrust
 from asflown.estimate.thrust.result import ThrustResult
 from asflown.kit.errors import BadInput
@@ -107,7 +107,7 @@ def test_recovery_of_a_degraded_thruster_flown_end_to_end():
         flight = fly(
             "wheel-bias-day28", craft=CASSINI, seed=k, changes={"epoch": f"{date}T00:00:00", "thruster_faults": weak}
         )
-        result = thrust(flight.telemetry, CASSINI, priors=priors_for(CASSINI, center_sigma_m=(0.01, 0.01, 0.1)))
+        result = thrust(flight.telemetry, CASSINI, priors=thrust_priors(CASSINI, center_sigma_m=(0.01, 0.01, 0.1)))
         entries.append(thrust_entry(result, flight.telemetry, CASSINI))
     health = judge(entries, kind="thrust")
     assert health.verdict == "alarm" and any("thrust_Z3_over_mean" in r for r in health.reasons)

@@ -105,7 +105,7 @@ def test_recovery_verdicts_of_a_change_and_of_none():
     assert sum(alarms) <= 2  # one in twenty looks
     moving = judge(history(change=0.4, seed=2))
     assert moving.verdict == "watch"
-    assert "angular_impulse has grown by" in moving.reasons[0]
+    assert "angular_impulse has increased by" in moving.reasons[0]
     f = moving.figure("angular_impulse")
     assert f.trend.change_percent_ci95[0] < 40 < f.trend.change_percent_ci95[1]
 

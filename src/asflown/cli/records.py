@@ -131,6 +131,13 @@ class GatesSimulateRecord(TypedDict):
     last: int
 
 
+class DemoRecord(TypedDict):
+    tables: Any
+    cover: dict[str, Any]
+    mission: dict[str, Any]
+    out: str
+
+
 # ---- trend and report ----
 
 

@@ -16,19 +16,21 @@ from . import records
 
 #: Verb -> module and class of its result, or a record that is no result's.
 _RESULTS = {
-    "torque": ("torque", "TorqueResult"),
-    "wheels": ("wheels", "WheelsResult"),
-    "inertia": ("inertia", "InertiaResult"),
-    "inertia plan": ("inertia", "SlewPlanResult"),
-    "inertia history": ("inertia", "InertiaHistoryResult"),
-    "external-torque": ("external", "ExternalTorqueResult"),
-    "density": ("density", "DensityResult"),
-    "jets": ("jets", "JetsResult"),
-    "leak": ("leak", "LeakResult"),
-    "thrust": ("thrust", "ThrustResult"),
-    "gates": ("gates", "GatesResult"),
-    "gates watch": ("gates", "GatesWatchResult"),
-    "gates predict": ("gates", "GatesPredictionResult"),
+    "torque": ("estimate.torque", "TorqueResult"),
+    "wheels": ("estimate.wheels", "WheelsResult"),
+    "inertia": ("estimate.inertia", "InertiaResult"),
+    "inertia plan": ("estimate.inertia", "SlewPlanResult"),
+    "inertia history": ("estimate.inertia", "InertiaHistoryResult"),
+    "external-torque": ("estimate.external", "ExternalTorqueResult"),
+    "density": ("estimate.density", "DensityResult"),
+    "jets": ("estimate.jets", "JetsResult"),
+    "leak": ("estimate.leak", "LeakResult"),
+    "thrust": ("estimate.thrust", "ThrustResult"),
+    "gates": ("estimate.gates", "GatesResult"),
+    "gates watch": ("estimate.gates", "GatesWatchResult"),
+    "gates predict": ("estimate.gates", "GatesPredictionResult"),
+    "budget": ("campaigns.budget", "ErrorBudget"),
+    "tune": ("campaigns.tune", "SpanSearch"),
 }
 _RECORDS = {
     "telemetry check": records.TelemetryCheckRecord,
@@ -37,6 +39,7 @@ _RECORDS = {
     "craft show": records.CraftRecord,
     "craft check": records.CraftRecord,
     "simulate": records.SimulateRecord,
+    "demo": records.DemoRecord,
     "gates history": GatesHistoryRecord,
     "gates simulate": records.GatesSimulateRecord,
     "trend add": records.TrendAddRecord,
@@ -50,7 +53,7 @@ _RECORDS = {
 
 def results() -> dict[str, Any]:
     """Class of the result of every verb that has one."""
-    return {v: getattr(import_module(f"asflown.estimate.{room}"), name) for v, (room, name) in _RESULTS.items()}
+    return {v: getattr(import_module(f"asflown.{room}"), name) for v, (room, name) in _RESULTS.items()}
 
 
 def schemas() -> dict[str, dict[str, Any]]:

@@ -63,7 +63,7 @@ def thrust(
     json: bool = JSON,
 ) -> None:
     """Thrust of every thruster, fall time and centre of mass, from wheel biasing, run-downs and burns."""
-    from ..estimate.firing import priors_for
+    from ..estimate.firing import thrust_priors
     from ..estimate.thrust import thrust as thrust_of
     from ..kit.quantities import numbers, quantity
 
@@ -73,7 +73,7 @@ def thrust(
         return thrust_entry(result, telemetry[0], job.craft, name)
 
     job = Job(context)
-    priors = priors_for(
+    priors = thrust_priors(
         job.craft,
         fall_s=None if fall_time is None else quantity(fall_time, "s"),
         fall_sigma_s=quantity(fall_sigma, "s"),

@@ -570,9 +570,7 @@ class Craft(_Data):
         if b is not a and moment - a.date > 5 * 86_400 * 10**9:
             x, how = self._fraction(a.date, b.date, moment)
             I_B = (1 - x) * tensor(a.elements) + x * tensor(b.elements)
-            for m in (a, b):
-                if m.doubt and 0 < x < 1:
-                    doubts.append(STATED(sentence=m.doubt))
+            doubts += [STATED(sentence=m.doubt) for m in (a, b) if m.doubt and 0 < x < 1]
             if how == "date":
                 doubts.append(INTERPOLATED(date=_day(moment), before=_day(a.date), after=_day(b.date)))
         else:

@@ -50,43 +50,44 @@ def write_report(healths: list[Health], out: Path, provenance: dict) -> tuple[Pa
 
 def _pictures(h: Health) -> list[Picture]:
     """Pictures of one kind of actuation, in the order of the page."""
-    entries, newest = list(h.entries), h.entries[-1]
-    one = f"the {h.kind} of {newest.date[:10]}"
-    pictures: list[Picture] = []
+    made = [*_over_the_years(h), *(_of_moves(h) if h.kind in MOVES else ())]
+    return [Picture(title, words, svg_of(figure, f"{h.kind}-{name}")) for name, title, words, figure in made]
 
-    def add(name: str, title: str, words: str, figure) -> None:
-        pictures.append(Picture(title, words, svg_of(figure, f"{h.kind}-{name}")))
 
+def _over_the_years(h: Health):
+    """(name, title, words, figure) of figures of merit over time."""
     for name in _FIRST:
         found = [f for f in h.figures if f.figure == name and len(f.rows) > 1]
         if found:
-            add(name, f"{name.replace('_', ' ')} over the years", _trend_words(found[0]), draw.trend_figure(*found))
+            yield name, f"{name.replace('_', ' ')} over the years", _trend_words(found[0]), draw.trend_figure(*found)
     for f in h.figures:
         if f.figure not in _FIRST and (f.verdict != "pass" or (h.kind not in MOVES and f.trend_p_adjusted is not None)):
-            add(f.figure, f"{f.figure.replace('_', ' ')} over the years", _trend_words(f), draw.trend_figure(f))
-    if h.kind not in MOVES:
-        return pictures
+            yield f.figure, f"{f.figure.replace('_', ' ')} over the years", _trend_words(f), draw.trend_figure(f)
+
+
+def _of_moves(h: Health):
+    """(name, title, words, figure) of the curves of actuations."""
+    entries, newest = list(h.entries), h.entries[-1]
+    one = f"the {h.kind} of {newest.date[:10]}"
     if len(entries) > 3:
-        add("family", "The newest compared with its family", f"{one}, fused, and the 95 % prediction band of a further one "
-            "at each instant.", draw.family_figure(newest, entries[:-1], "newest against the past"))  # fmt: skip
+        yield ("family", "The newest compared with its family", f"{one}, fused, and the 95 % prediction band of a further one "
+               "at each instant.", draw.family_figure(newest, entries[:-1], "newest against the past"))  # fmt: skip
     for basis in BASES:
         if any(e.curve(f"torque, {basis}") is not None for e in entries):
-            add(f"overlay-{basis[:5]}", f"All {h.kind}s, {basis}", "Older ones in lighter grey, the first dotted blue, the newest red.",
-                draw.overlay_figure(entries, f"torque, {basis}", basis))  # fmt: skip
+            yield (f"overlay-{basis[:5]}", f"All {h.kind}s, {basis}", "Older ones in lighter grey, the first dotted blue, the newest red.",
+                   draw.overlay_figure(entries, f"torque, {basis}", basis))  # fmt: skip
     for basis in BASES:
         if newest.curve(f"torque, {basis}") is not None:
-            add(f"merit-{basis[:5]}", f"Figures of merit, {basis}", f"{one}: the shaded area is the impulse of the first phase, the dashed lines are the means "
-                "of the two largest excursions of each sign after it.", draw.merit_figure(newest, basis, basis))  # fmt: skip
-    if h.pairs:
-        for basis in BASES:
-            add(f"cold-{basis[:5]}", f"Cold and warm, {basis}", "Crosses: after a long rest; rings: the next one. Each pair has its colour.",
-                draw.cold_warm_figure(h.pairs, f"torque, {basis}", basis))  # fmt: skip
+            yield (f"merit-{basis[:5]}", f"Figures of merit, {basis}", f"{one}: the shaded area is the impulse of the first phase, the dashed lines are the "
+                   "means of the two largest excursions of each sign after it.", draw.merit_figure(newest, basis, basis))  # fmt: skip
+    for basis in BASES if h.pairs else ():
+        yield (f"cold-{basis[:5]}", f"Cold and warm, {basis}", "Crosses: after a long rest; rings: the next one. Each pair has its colour.",
+               draw.cold_warm_figure(h.pairs, f"torque, {basis}", basis))  # fmt: skip
     if newest.curve("motor_current") is not None:
-        add("devices", "Devices", f"{one}: the motor stalls in the green span, between two samples.",
-            draw.devices_figure(newest, "torque with thermal and device data"))  # fmt: skip
-    add("methods", "Methods compared", f"{one}: the fused method with its 95 % band, and the two methods of the cover paper.",
-        draw.methods_figure(newest, "three bases"))  # fmt: skip
-    return pictures
+        yield ("devices", "Devices", f"{one}: the motor stalls in the green span, between two samples.",
+               draw.devices_figure(newest, "torque with thermal and device data"))  # fmt: skip
+    yield ("methods", "Methods compared", f"{one}: the fused method with its 95 % band, and the two methods of the cover paper.",
+           draw.methods_figure(newest, "three bases"))  # fmt: skip
 
 
 def _trend_words(f: FigureHealth) -> str:

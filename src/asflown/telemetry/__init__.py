@@ -1,1 +1,1 @@
-"""The only door for telemetry: whatever comes in leaves as named SI channels, each at its own times."""
+"""Telemetry: files are read here only, and become named SI channels, each at its own times."""

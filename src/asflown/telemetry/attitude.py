@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..kit.doubts import Doubts
 from ..kit.errors import BadInput
 from ..kit.rotations import rates_between
 from ..kit.timeline import NS
@@ -187,4 +188,4 @@ def _rms(x: np.ndarray) -> float:
 
 
 def _doubted(telemetry: Telemetry, doubt: Doubt) -> Telemetry:
-    return replace(telemetry, doubts=telemetry.doubts + [doubt])
+    return replace(telemetry, doubts=telemetry.doubts + Doubts([doubt]))

@@ -175,7 +175,7 @@ def _is_regular(c: Channel) -> bool:
 _MEDIAN_OF_SECOND = MEDIAN_SIZE * 6**0.5  # median |x0 - 2 x1 + x2| of unit white noise
 
 
-def noise_sigma(c: Channel) -> float:
+def sample_noise(c: Channel) -> float:
     """White noise of one sample, from local second differences (median, so events do not count). SI
 
     0 where more than half of them are zero: the noise is then below the quantisation step."""
@@ -320,11 +320,11 @@ def _falls(c: Channel) -> list[Finding]:
         hit = jump < 0
         detail = "decreases although it is cumulative: a wrap (declare it in a channel dictionary) or a reset"
     elif c.kind.stem in ("wheel_rate", "attitude_error"):
-        hit = np.abs(jump) > max(0.75 * np.ptp(x), 50 * noise_sigma(c))
+        hit = np.abs(jump) > max(0.75 * np.ptp(x), 50 * sample_noise(c))
         for i in np.flatnonzero(hit):
             before, after = jump[max(0, i - 5) : i], jump[i + 1 : i + 6]
             drift = [
-                np.sign(d.mean()) if len(d) and np.abs(d.sum()) > 3 * noise_sigma(c) else 0 for d in (before, after)
+                np.sign(d.mean()) if len(d) and np.abs(d.sum()) > 3 * sample_noise(c) else 0 for d in (before, after)
             ]
             hit[i] = drift[0] == drift[1] == -np.sign(jump[i])
         detail = "jumps over its whole range against its own drift: an undeclared wrap?"
@@ -475,7 +475,7 @@ def summaries(telemetry: Telemetry) -> list[ChannelSummary]:
                 dropouts=len(dropouts(c)),
                 gaps=tuple((float(telemetry.seconds(a)), float(telemetry.seconds(b))) for a, b in gaps(c)),
                 quantisation=None if state else c.count_size or quantisation_step(c.usable.values) or None,
-                noise=None if state or c.kind.behaves == "cumulative" or len(at) < 5 else noise_sigma(c),
+                noise=None if state or c.kind.behaves == "cumulative" or len(at) < 5 else sample_noise(c),
                 suspicions=tuple(odd),
             )
         )

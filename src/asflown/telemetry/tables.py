@@ -127,24 +127,8 @@ def times_of(table: Table, column: int, scale: str, origin_ns: int = 0) -> np.nd
     if isinstance(cells, np.ndarray) and cells.dtype.kind == "M":
         cells = ["" if np.isnat(c) else str(c) for c in cells.astype("datetime64[ns]")]
     if scale == "utc":
-        for row, cell in enumerate(cells):
-            year = str(cell).strip()[:4]
-            if not (year.isascii() and year.isdigit() and int(year) in _YEARS):
-                raise _no_time(table, column, row, "Write UTC as 2015-09-29T00:00:00 or 2015-272T00:00:00.")
-        try:
-            return np.asarray(utc_to_tai_ns(list(cells)), np.int64)
-        except BadInput as why:
-            row = next((i for i, c in enumerate(cells) if repr(str(c)) in why.what or repr(c) in why.what), 0)
-            raise _no_time(table, column, row, why.remedy) from None
-    ns = np.empty(len(cells), np.int64)
-    for row, cell in enumerate(cells.tolist() if isinstance(cells, np.ndarray) else cells):
-        try:
-            seconds = Decimal(cell if isinstance(cell, str) else repr(cell))
-            if not abs(seconds) < LONGEST_S:  # also NaN
-                raise InvalidOperation
-            ns[row] = int((seconds * NS).to_integral_value())
-        except (InvalidOperation, ValueError):
-            raise _no_time(table, column, row, "Every row needs a time, a number of seconds.") from None
+        return _utc_times(table, column, cells)
+    ns = _decimal_seconds(table, column, cells)
     if scale == "gps s":
         return ns + int(gps_to_tai_ns(0.0))
     if scale == "et s":
@@ -155,6 +139,40 @@ def times_of(table: Table, column: int, scale: str, origin_ns: int = 0) -> np.nd
         starts = np.asarray(utc_to_tai_ns([str(np.datetime64(int(d), "D")) for d in days]), np.int64)
         return starts[which] + rest
     return ns + origin_ns
+
+
+def _utc_times(table: Table, column: int, cells) -> np.ndarray:
+    for row, cell in enumerate(cells):
+        year = str(cell).strip()[:4]
+        if not (year.isascii() and year.isdigit() and int(year) in _YEARS):
+            raise _no_time(table, column, row, "Write UTC as 2015-09-29T00:00:00 or 2015-272T00:00:00.")
+    try:
+        return np.asarray(utc_to_tai_ns(list(cells)), np.int64)
+    except BadInput as why:
+        row = next((i for i, c in enumerate(cells) if not _is_utc(c)), 0)
+        raise _no_time(table, column, row, why.remedy) from None
+
+
+def _is_utc(cell) -> bool:
+    try:
+        utc_to_tai_ns(str(cell))
+    except BadInput:
+        return False
+    return True
+
+
+def _decimal_seconds(table: Table, column: int, cells) -> np.ndarray:
+    """Seconds as int64 ns, exact to the last digit written."""
+    ns = np.empty(len(cells), np.int64)
+    for row, cell in enumerate(cells.tolist() if isinstance(cells, np.ndarray) else cells):
+        try:
+            seconds = Decimal(cell if isinstance(cell, str) else repr(cell))
+            if not abs(seconds) < LONGEST_S:  # also NaN
+                raise InvalidOperation
+            ns[row] = int((seconds * NS).to_integral_value())
+        except (InvalidOperation, ValueError):
+            raise _no_time(table, column, row, "Every row needs a time, a number of seconds.") from None
+    return ns
 
 
 def whole_second(tai_ns: int) -> int:
@@ -184,6 +202,24 @@ def _shown(cell: object) -> str:
 # ---- readers ----------------------------------------------------------------------------------
 
 
+def _csv_rows(numbered: list[tuple[int, str]]) -> list[list[str]]:
+    """Cells of lines given with their numbers in the file."""
+    rows: list[list[str]] = []
+    reader = csv.reader((line for _, line in numbered), strict=True, skipinitialspace=True)
+    try:
+        for row in reader:
+            if reader.line_num != len(rows) + 1:
+                raise csv.Error("a quotation mark is never closed")
+            rows.append(row)
+    except csv.Error as why:
+        raise BadInput(
+            f"this line cannot be read ({why})",
+            line=numbered[min(len(rows), len(numbered) - 1)][0],
+            remedy="Write comma-separated cells; quotation marks come in pairs, within one line.",
+        ) from None
+    return rows
+
+
 def read_csv(data: bytes) -> Table:
     """A comma-separated table, plain or gzip, with '#' comments; raises BadInput naming the line."""
     text = _text(data).replace("\r\n", "\n").replace("\r", "\n")
@@ -197,19 +233,7 @@ def read_csv(data: bytes) -> Table:
     if not numbered:
         raise BadInput("there is no header line", remedy="The first line names the columns, as in 'time [s],body_rate_x [rad/s]'.")  # fmt: skip
     lines = [n for n, _ in numbered]
-    rows: list[list[str]] = []
-    reader = csv.reader((line for _, line in numbered), strict=True, skipinitialspace=True)
-    try:
-        for row in reader:
-            if reader.line_num != len(rows) + 1:
-                raise csv.Error("a quotation mark is never closed")
-            rows.append(row)
-    except csv.Error as why:
-        raise BadInput(
-            f"this line cannot be read ({why})",
-            line=lines[min(len(rows), len(lines) - 1)],
-            remedy="Write comma-separated cells; quotation marks come in pairs, within one line.",
-        ) from None
+    rows = _csv_rows(numbered)
     headings = [h.strip() for h in rows[0]]
     other = next((w for s, w in ((";", "semicolons"), ("\t", "tabs"), ("|", "bars")) if s in headings[0]), None)
     if len(headings) == 1 and other:
@@ -468,7 +492,7 @@ def _spread(instants: np.ndarray, at_ns: np.ndarray, cells: list[str]) -> list[s
     return column
 
 
-def _write_csv(columns: dict[str, list], epoch: str | None, path: Path, packed: bool) -> None:
+def _write_csv(columns: dict[str, list], epoch: str | None, path: Path, *, packed: bool) -> None:
     import io
 
     text = io.StringIO()

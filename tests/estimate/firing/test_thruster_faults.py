@@ -8,7 +8,7 @@ import pytest
 from asflown.craft.load import load_craft
 from asflown.estimate.firing.counters import COUNTER_FALLS
 from asflown.estimate.firing.firings import BRANCH_NOT_DESCRIBED
-from asflown.estimate.firing.priors import priors_for
+from asflown.estimate.firing.priors import thrust_priors
 from asflown.estimate.leak.doubts import BRANCH_CHANGES, LOSS_TOO_LARGE, OTHER_BRANCH, UNCOUNTED_PULSES
 from asflown.estimate.leak.watch import leak
 from asflown.estimate.subject.wheel_limits import AT_LIMIT, STANDS_STILL
@@ -149,7 +149,7 @@ def test_reading_that_stops_at_the_limit_does_not_count(full):
     joint = thrust(tlm, CASSINI)
     assert joint.doubts.of(AT_LIMIT).about(wheel="RWA1")
     assert abs(joint.mean_thrust_N - 0.699) < 2.5 * joint.mean_thrust_sigma_N
-    forty = priors_for(CASSINI, fall_s=0.040)
+    forty = thrust_priors(CASSINI, fall_s=0.040)
     assert thrust(tlm, CASSINI, method="printed", priors=forty).mean_thrust_N == pytest.approx(0.699, rel=0.04)
     assert not leak(tlm, CASSINI, thrust_N=0.699).alarm
     stuck = tlm.channel("wheel_rate_RWA1")

@@ -8,7 +8,7 @@ from asflown.dynamics.pulses import Valve, moment_matrix
 from asflown.estimate.firing.chains import momentum_chain, to_come
 from asflown.estimate.firing.counters import COUNTER_FALLS, PULSES_GUESSED
 from asflown.estimate.firing.firings import BRANCH_NOT_DESCRIBED, firings_of
-from asflown.estimate.firing.priors import priors_for
+from asflown.estimate.firing.priors import thrust_priors
 from asflown.estimate.firing.pulse_counts import guess_pulses
 from asflown.estimate.firing.pulse_lengths import weak_because_lasting
 from asflown.estimate.subject import subject_of
@@ -102,7 +102,7 @@ def test_published_virtual_accelerometer_ends_the_burn(burn):
     thrust that would have made it right is M dV over the on-times, R of the burn included."""
     on = burn.truth.thrusters.on_time_s[-1].sum()
     assert 0.704 * on / MASS == pytest.approx(0.25, rel=8e-3)  # with the pulses of the hold before and after it
-    found = thrust(burn.telemetry, CASSINI, method="accelerometer", priors=priors_for(CASSINI, mass_kg=MASS))
+    found = thrust(burn.telemetry, CASSINI, method="accelerometer", priors=thrust_priors(CASSINI, mass_kg=MASS))
     true = -burn.truth.thrusters.impulse_Ns[-1].sum() / MASS
     assert found.burn.delta_v_m_s() == pytest.approx(true, abs=3 * found.burn.delta_v_sigma_m_s)
     assert found.unadjusted_N["bias subtracted"] == pytest.approx(-true * MASS / on, rel=1e-2)
@@ -110,7 +110,7 @@ def test_published_virtual_accelerometer_ends_the_burn(burn):
 
 def test_published_appendix_d_with_both_signs(burn):
     """The bias is the output's drift before the burn: added, as printed, it counts twice (29 mm/s for 1e-4 m/s2 over 290 s)."""
-    found = thrust(burn.telemetry, CASSINI, method="accelerometer", priors=priors_for(CASSINI, mass_kg=MASS))
+    found = thrust(burn.telemetry, CASSINI, method="accelerometer", priors=thrust_priors(CASSINI, mass_kg=MASS))
     assert found.mean_thrust_N == pytest.approx(0.7, abs=3 * found.mean_thrust_sigma_N)
     assert found.burn.bias_m_s2 == pytest.approx(1e-4, rel=0.02)
     wrong = found.unadjusted_N["bias added, as printed"]
@@ -200,7 +200,7 @@ def test_recovery_of_thrust_fall_time_and_centre_of_mass(day28, burn):
     """A biasing alone leaves thrust and fall time tied; with a burn both are known."""
     alone = thrust(day28.telemetry, CASSINI)
     assert abs(alone.mean_thrust_N - 0.7) < 2.5 * alone.mean_thrust_sigma_N and alone.correlation["fall_time"] < -0.9
-    both = thrust([day28.telemetry, burn.telemetry], CASSINI, priors=priors_for(CASSINI, mass_kg=MASS))
+    both = thrust([day28.telemetry, burn.telemetry], CASSINI, priors=thrust_priors(CASSINI, mass_kg=MASS))
     assert (
         both.mean_thrust_N == pytest.approx(0.7, abs=0.012)
         and both.mean_thrust_sigma_N < 0.4 * alone.mean_thrust_sigma_N
@@ -220,7 +220,7 @@ def test_recovery_of_one_weak_thruster():
     loose = thrust(flight.telemetry, CASSINI)
     assert loose.doubts.has(WEAK_OR_CENTER)
     ratio, sigma = thrust(
-        flight.telemetry, CASSINI, priors=priors_for(CASSINI, center_sigma_m=(0.01, 0.01, 0.1))
+        flight.telemetry, CASSINI, priors=thrust_priors(CASSINI, center_sigma_m=(0.01, 0.01, 0.1))
     ).over_mean["Z3"]
     assert abs(ratio - 0.8) < 3 * sigma < 0.12
 
@@ -274,7 +274,7 @@ def test_recovery_pulls_are_unit_normal_with_the_truth_from_the_priors():
             fly(s, craft=true, seed=seed, changes={"thrusters": how, "thruster_faults": own})
             for s in ("wheel-bias-day28", "rcs-burn")
         )
-        priors = priors_for(CASSINI, mass_kg=MASS)
+        priors = thrust_priors(CASSINI, mass_kg=MASS)
         for key, flights in (("alone", [bias]), ("both", [bias, burned])):
             r = thrust([f.telemetry for f in flights], CASSINI, priors=priors)
             impulse = sum(f.truth.thrusters.impulse_Ns[-1] for f in flights)
@@ -354,7 +354,7 @@ def test_nothing_fires_no_mass_and_other_refusals(day28, burn):
     with pytest.raises(BadInput, match="mass is not known"):
         thrust(burn.telemetry, CASSINI, method="accelerometer")
     with pytest.raises(BadInput, match="not in the telemetry"):
-        thrust(tlm, CASSINI, method="accelerometer", priors=priors_for(CASSINI, mass_kg=MASS))
+        thrust(tlm, CASSINI, method="accelerometer", priors=thrust_priors(CASSINI, mass_kg=MASS))
     with pytest.raises(BadInput, match="variant"):
         thrust(tlm, CASSINI, variant="printed")
     with pytest.raises(BadInput, match="not known"):
@@ -370,12 +370,12 @@ def test_nothing_fires_no_mass_and_other_refusals(day28, burn):
         {"spin_share": 1.0},
     ):
         with pytest.raises(BadInput):
-            priors_for(CASSINI, **bad)
+            thrust_priors(CASSINI, **bad)
 
 
 def test_momentum_chain_uses_no_more_than_the_counters_tell(day28):
     f = firings_of(subject_of(every(day28.telemetry, 4), CASSINI))
-    chain = momentum_chain(f, priors_for(CASSINI), 1)
+    chain = momentum_chain(f, thrust_priors(CASSINI), 1)
     assert chain.on_time_s.sum() == pytest.approx(f.total_on_time_s.sum())
     assert chain.used.all() and (np.diff(f.tai_ns) > 0).all()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,9 +12,6 @@ from ...kit.result import Estimate, Series, per_spin_inertia
 from ...kit.schema import Annotated, Doc, Intervals, NotRequired, Number, TypedDict, Vector
 from ...kit.table import Table
 from ...telemetry.channels import AXES
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 _RPM_PER_DAY = 86_400 * 60 / (2 * np.pi)
 
@@ -129,7 +126,7 @@ class ExternalTorqueResult(Estimate):
         if not self.relative:
             sigma = np.zeros(3) if self.torque_sigma_Nm is None else self.torque_sigma_Nm
             factor, unit = scaled_unit(float(max(np.abs(self.torque_Nm).max(), sigma.max())), "N m")
-        rows = []
+        rows: list[tuple[str, ...]] = []
         for j, axis in enumerate(AXES):
             if self.torque_sigma_Nm is None or self.torque_ci95_Nm is None or self.torque_systematic_Nm is None:
                 rows.append((axis, f"{factor * self.torque_Nm[j]:+.4g}"))
@@ -143,7 +140,7 @@ class ExternalTorqueResult(Estimate):
                 )
             )
         remarks = []
-        if self.gyroscopic_Nm is not None and self.turn_rad_s is not None:
+        if self.gyroscopic_Nm is not None and self.turn_rad_s is not None and np.any(self.turn_rad_s):
             g = factor * self.gyroscopic_Nm
             remarks.append(f"w x H is included: {_three(g)}; w = {_three(self.turn_rad_s)} rad/s from {self.turn_from}")
         if self.wheel_drift_rad_s2:
@@ -159,5 +156,5 @@ class ExternalTorqueResult(Estimate):
         return (Table(title, tuple(rows), head, tuple(remarks)),)
 
 
-def _three(values: Sequence[float]) -> str:
+def _three(values: np.ndarray) -> str:
     return ", ".join(f"{v:+.3g}" for v in values)

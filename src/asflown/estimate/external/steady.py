@@ -1,4 +1,4 @@
-"""A steady external torque from the momentum that craft and wheels gain (001 sections IV and Appendix A).
+"""A steady external torque from the momentum that craft and wheels gain (Feldman & Lee section IV and Appendix A).
 
 ``drift``: on a quiet day the wheels take up what acts on the craft.  As printed, T = sum a J (change of rate)/(time) from
 two readings and one mean spin inertia, in axes taken not to turn.  An Earth-pointed craft does turn, by some 1e-8 rad/s,
@@ -127,7 +127,7 @@ def external_torque(
         'drift' fits a line to the momentum in a hold, 'momentum' a balance that slews may cross.  By default drift where the
         record holds no slew.
     variant : {'corrected', 'printed'}
-        'printed' is Appendix A of Lee and Wang (paper 001) with its errors: two readings, without w x H (drift only).
+        'printed' is Appendix A of Feldman & Lee with its errors: two readings, without w x H (drift only).
     frame : {'body', 'inertial'}
         Axes in which the torque is constant; 'inertial' is that of the quaternion.
     turn_rad_s : array_like of shape (3,), optional
@@ -175,7 +175,7 @@ def external_torque(
         )
     try:
         if variant == "printed":
-            result = _printed(subject, alternative)
+            result = _printed(subject, alternative=alternative)
         else:
             result = _drift(subject, turn_rad_s) if method == "drift" else _momentum(subject, frame)
     except BadInput as why:
@@ -196,8 +196,8 @@ def _turns_far(tlm: Telemetry) -> bool:
     return len(tai_ns) > 1 and float(np.linalg.norm(np.median(rates, axis=0)) * np.ptp(tai_ns) / NS) > _FAR
 
 
-def _printed(subject: Subject, alternative: bool) -> ExternalTorqueResult:
-    """001 Appendix A: the last reading less the first, whatever lies between."""
+def _printed(subject: Subject, *, alternative: bool) -> ExternalTorqueResult:
+    """Feldman & Lee Appendix A: the last reading less the first, whatever lies between."""
     wheels = subject.wheels()
     tai_ns, rates = together(subject.telemetry, [c.name for c, _ in wheels])
     if len(tai_ns) < 2:

@@ -6,11 +6,12 @@ from .counters import Counters, check_thrusters, control_step_s, counters_of, st
 from .firings import Firings, firings_of
 from .impulse import THRUST_SHARE, Gained, gained
 from .missed_pulses import PULSES, gained_idle, pulse_Nms, uncounted
-from .priors import CENTER_SIGMA, Priors, center_doubts, priors_for
+from .priors import CENTER_SIGMA, Priors, center_doubts, thrust_priors
 from .valve import valve_of
 
 __all__ = [
     "CENTER_SIGMA", "PULSES", "THRUST_SHARE", "Chain", "Counters", "Firings", "Gained", "Nuisance", "Parameter", "Priors",
     "Source", "branch_change", "center_doubts", "check_thrusters", "control_step_s", "counters_of", "firings_of", "gained",
-    "gained_idle", "momentum_chain", "other_branch", "priors_for", "pulse_Nms", "step_of", "uncounted", "undescribed", "valve_of",
+    "gained_idle", "momentum_chain", "other_branch", "pulse_Nms", "step_of", "thrust_priors", "uncounted", "undescribed",
+    "valve_of",
 ]  # fmt: skip

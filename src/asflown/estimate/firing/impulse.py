@@ -23,7 +23,7 @@ from ...telemetry.channels import AXES
 from ..subject import INERTIA_SHARE, samples_of
 from .chains import Chain, momentum_chain
 from .firings import Firings, firings_of
-from .priors import Priors, priors_for
+from .priors import Priors, thrust_priors
 from .valve import valve_of
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def _on_wheels(subject: Subject, axis: str) -> Gained:
 
 def _on_thrusters(subject: Subject, axis: str) -> Gained:
     craft = subject.craft.craft
-    priors = priors_for(craft)
+    priors = thrust_priors(craft)
     f = _hold(subject)
     j = AXES.index(axis)
     whole = momentum_chain(f, priors, 1)

@@ -80,7 +80,7 @@ def center_doubts(craft: Craft, sigma_m) -> list[Doubt]:
     return [CENTER_NOT_KNOWN(taken=taken, sigma=meters)]
 
 
-def priors_for(
+def thrust_priors(
     craft: Craft,
     *,
     fall_s: float | None = None,

@@ -16,6 +16,9 @@ from ...kit.compiled import jit
 _MOST_CORNERS = 160
 #: A column of which less than this share is its own, beside those already in the set, is refused: rounding would decide.
 _ALONE = 1e-9
+#: Cumulative probabilities of the moves: a corner is born, removed, moved, split in two, two are merged; else another
+#: roughness is tried.  Moves are proposed most often, since they refine what births have found.
+_BORN, _REMOVED, _MOVED, _SPLIT, _MERGED = 0.15, 0.30, 0.75, 0.85, 0.95
 
 
 @jit
@@ -102,9 +105,10 @@ def sample(G, b, evidence, prior, always, size, corner_prior, freedom, proposals
     for n in range(proposals):
         bends = count - fixed
         kind = rng.random()
-        to, change, ratio, added, gone, gone2 = level, 0, 0.0, -1, -1, -1
+        # corners added and gone, -1: none; a split adds a second one, never the first column, so that 0 is none
+        to, second, ratio, added, gone, gone2 = level, 0, 0.0, -1, -1, -1
         new = 0  # corners proposed; 0: nothing
-        if kind < 0.15:  # born
+        if kind < _BORN:  # born
             c = fixed + int(rng.random() * free)
             if not on[c] and count < most:
                 for i in range(count):
@@ -113,12 +117,12 @@ def sample(G, b, evidence, prior, always, size, corner_prior, freedom, proposals
                 precision2[count] = rng.gamma(freedom / 2) * 2 / freedom / variance
                 new, added = count + 1, c
                 ratio = math.log((alpha + bends) / (beta + free - bends - 1)) + math.log(free / (bends + 1.0))
-        elif kind < 0.30:  # removed
+        elif kind < _REMOVED:  # removed
             if bends > 0:
                 j = fixed + int(rng.random() * bends)
                 new, gone = _without(active, precision, count, j, active2, precision2), active[j]
                 ratio = -math.log((alpha + bends - 1) / (beta + free - bends)) - math.log(free / (1.0 * bends))
-        elif kind < 0.75:  # moved
+        elif kind < _MOVED:  # moved
             if bends > 0:
                 j = fixed + int(rng.random() * bends)
                 far = rng.random()
@@ -128,7 +132,7 @@ def sample(G, b, evidence, prior, always, size, corner_prior, freedom, proposals
                     new = _without(active, precision, count, j, active2, precision2) + 1
                     active2[new - 1], precision2[new - 1] = c, precision[j]
                     added, gone = c, active[j]
-        elif kind < 0.85:  # split in two
+        elif kind < _SPLIT:  # split in two
             if bends > 0 and count < most:
                 j = fixed + int(rng.random() * bends)
                 left, right = active[j] - 1 - int(rng.random() * reach), active[j] + 1 + int(rng.random() * reach)
@@ -137,11 +141,11 @@ def sample(G, b, evidence, prior, always, size, corner_prior, freedom, proposals
                     active2[new - 2], precision2[new - 2] = left, precision[j]
                     active2[new - 1] = right
                     precision2[new - 1] = rng.gamma(freedom / 2) * 2 / freedom / variance
-                    added, gone, change = left, active[j], right
+                    added, gone, second = left, active[j], right
                     ways = _between(left, right, reach, on, active[j])
                     ratio = math.log((alpha + bends) / (beta + free - bends - 1))
                     ratio += math.log(bends * reach * reach) - math.log((bends + 1.0) * bends * ways)
-        elif kind < 0.95:  # two merged
+        elif kind < _MERGED:  # two merged
             if bends > 1:
                 j, j2 = fixed + int(rng.random() * bends), fixed + int(rng.random() * bends)
                 left, right = active[j], active[j2]
@@ -174,8 +178,8 @@ def sample(G, b, evidence, prior, always, size, corner_prior, freedom, proposals
                     on[gone2] = False
                 if added >= 0:
                     on[added] = True
-                if change > 0:
-                    on[change] = True
+                if second > 0:
+                    on[second] = True
                 active, active2, precision, precision2 = active2, active, precision2, precision
                 L, L2, z, z2 = L2, L, z2, z
                 count, now, level = new, then, to

@@ -138,6 +138,7 @@ class SlewPlanResult(Estimate):
     """The best turn, and those about the body axes beside it.  Sigmas in kg m2, or per unit spin inertia where ``relative``."""
 
     RECORD: ClassVar[type] = SlewPlanRecord
+    OLD_KEYS: ClassVar[dict[str, str]] = {"sigma_before": "inertia_sigma_before_kgm2"}
 
     inertia_kgm2: np.ndarray  # (3, 3), what the prior is centred on
     rank_before: int

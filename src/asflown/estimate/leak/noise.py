@@ -9,12 +9,14 @@ import numpy as np
 from ...kit.errors import BadInput
 from ...kit.regression import memory
 from ...kit.timeline import runs
-from ..subject import changes_as_in_a_slew
 from .residual import AXES_IN_A_LEAK, Steps
 
 #: Noise is learned from quiet pieces of so many instants, from the first ones of which so many count together.
 _PIECE, _SHORTEST, _ENOUGH, _FEWEST = 40, 8, 150, 12
 _TOO_LARGE = 2.5  # times the median piece's variance: noise alone gives it to one piece in a million
+#: A piece whose body rates change by this is not quiet, slew or not: thrusters that no counter reports shake a hold by more, and
+#: kicks of theirs are what a median would take out, and a piece's own noise hide (unlike ``subject.slews``). [rad/s]
+_SHAKEN = 1e-4
 _SMALLEST_NOISE = 1e-5  # N m s; below it noise-free data would make the filter believe rounding
 
 
@@ -43,7 +45,8 @@ def learned_noise(steps: Steps, *, final: bool) -> Noise | None:
         for start in range(s.start, s.stop, _PIECE):
             part = slice(start, min(start + _PIECE, s.stop))
             unfinished = part.stop == len(steps.tai_ns) and part.stop - start < _PIECE and not final
-            if part.stop - start < _SHORTEST or unfinished or changes_as_in_a_slew(steps.body_rate[part]):
+            shaken = np.ptp(steps.body_rate[part], axis=0).max() > _SHAKEN
+            if part.stop - start < _SHORTEST or unfinished or shaken:
                 continue
             pieces.append((part.stop, _over_a_line(steps, part)))
             like = _alike_in_size(pieces)

@@ -27,7 +27,7 @@ def without_spikes(rates: np.ndarray) -> np.ndarray:
     return ndimage.median_filter(rates, (5,) + (1,) * (rates.ndim - 1), mode="nearest")
 
 
-def changes_as_in_a_slew(rates: np.ndarray, count_size: float = 0.0) -> bool:
+def changes_as_in_a_slew(rates: np.ndarray, *, count_size: float = 0.0) -> bool:
     """Whether any of the body's rates (N, k) [rad/s] changes more than holds let it; how fast it turns does not matter."""
     if len(rates) < 5:
         return False
@@ -37,7 +37,7 @@ def changes_as_in_a_slew(rates: np.ndarray, count_size: float = 0.0) -> bool:
 
 def slews(telemetry: Telemetry) -> bool:
     """Whether the craft slews: a steady turn, as of a craft that points to the Earth, is none."""
-    return any(changes_as_in_a_slew(c.values[:, None], c.count_size) for c in _rates(telemetry))
+    return any(changes_as_in_a_slew(c.values[:, None], count_size=c.count_size) for c in _rates(telemetry))
 
 
 def turns(telemetry: Telemetry) -> bool:

@@ -115,9 +115,8 @@ def subject_of(telemetry: Telemetry, craft: Craft, moving: str | None = "auto") 
     doubts = [*telemetry.doubts, *now.doubts]
     if not telemetry.dated and not given and len(craft.mass_properties) > 1:
         doubts.append(UNDATED())
-    for name in telemetry.members("wheel_rate"):
-        if name in craft.wheel_names and now.wheel(name) is None:
-            doubts.append(NOT_IN_SERVICE(wheel=name, date=_when(telemetry)))
+    idle = [n for n in telemetry.members("wheel_rate") if n in craft.wheel_names and now.wheel(n) is None]
+    doubts += [NOT_IN_SERVICE(wheel=name, date=_when(telemetry)) for name in idle]
     part = None if given else (_moved(telemetry, craft) if moving == "auto" else moving)
     I_B = now.inertia_kgm2
     if part is not None and I_B is not None:

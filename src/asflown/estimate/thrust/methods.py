@@ -15,7 +15,7 @@ from ...kit.doubts import Doubts
 from ...kit.errors import BadInput, check_choice
 from ...kit.result import recorded
 from ...telemetry.telemetry import Telemetry
-from ..firing import priors_for
+from ..firing import thrust_priors
 from ..subject import subject_of
 from .doubts import doubts_of_dates
 from .joint import joint
@@ -63,7 +63,7 @@ def thrust(
         Formula of R for the printed and accelerometer methods: 'printed' gives 1.395 for a pulse of 125 ms, 'corrected' 1.359.
         The joint method has the corrected one only.
     priors : Priors, optional
-        What is known beforehand, as ``priors_for`` gives it with what the user says instead: fall time [s], centre of mass [m],
+        What is known beforehand, as ``thrust_priors`` gives it with what the user says instead: fall time [s], centre of mass [m],
         scatter, mass [kg].  By default those of the craft.
 
     Returns
@@ -85,7 +85,7 @@ def thrust(
             remedy="The joint method is always corrected; printed and accelerometer take --variant corrected or printed.",
         )
     records = [telemetry] if isinstance(telemetry, Telemetry) else list(telemetry)
-    known = priors or priors_for(craft)
+    known = priors or thrust_priors(craft)
     subjects = [subject_of(t, craft) for t in records]
     if method == "joint":
         done = joint(subjects, known)

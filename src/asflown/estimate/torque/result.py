@@ -80,6 +80,8 @@ class TorqueRecord(TypedDict):
     torque_per_spin_inertia_rad_s2: NotRequired[Column | None]
     torque_sigma_per_spin_inertia_rad_s2: NotRequired[Column | None]
     momentum_per_spin_inertia_rad_s: NotRequired[Column | None]
+    band_68_per_spin_inertia_rad_s2: NotRequired[Annotated[dict | None, Doc("kept for this version")]]
+    band_95_per_spin_inertia_rad_s2: NotRequired[Annotated[dict | None, Doc("kept for this version")]]
     torque_ci68_per_spin_inertia_rad_s2: NotRequired[list[Column] | None]
     torque_ci95_per_spin_inertia_rad_s2: NotRequired[list[Column] | None]
 

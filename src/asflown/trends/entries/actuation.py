@@ -168,14 +168,14 @@ def _check_doubt(figure, value: Value) -> Doubt | None:
 
 
 def _curves(tlm: Telemetry, event: Event, torques: dict[str, Torque], mechanism: Mechanism):
-    for basis, torque in torques.items():
+    for basis, found in torques.items():
         sigma = None
-        if len(torque.drawn_Nm):
-            sigma = np.interp(torque.time_s, torque.drawn_time_s, spread(torque.drawn_Nm))
-        yield Curve(f"torque, {basis}", "N m", torque.time_s, torque.mean_Nm, sigma)
+        if len(found.drawn_Nm):
+            sigma = np.interp(found.time_s, found.drawn_time_s, spread(found.drawn_Nm))
+        yield Curve(f"torque, {basis}", "N m", found.time_s, found.mean_Nm, sigma)
     actuation = Actuation(tlm, event, mechanism)
     for stem in DEVICES:
-        found = actuation.samples(stem)
-        if found is not None and len(found[0]):
+        samples = actuation.samples(stem)
+        if samples is not None and len(samples[0]):
             unit = next(c.kind.unit for c in tlm.channels.values() if c.kind.stem == stem)
-            yield Curve(stem, unit, found[0], np.asarray(found[1], float))
+            yield Curve(stem, unit, samples[0], np.asarray(samples[1], float))

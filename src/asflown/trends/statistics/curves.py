@@ -42,7 +42,7 @@ def instants(curves: list[Curve]) -> np.ndarray:
     return np.linspace(0.0, min(1.1 * stop, last), _INSTANTS)
 
 
-def registered(curve: Curve, t: np.ndarray, onto: np.ndarray, scaled: bool) -> np.ndarray:
+def registered(curve: Curve, t: np.ndarray, onto: np.ndarray, *, scaled: bool) -> np.ndarray:
     """``curve`` shifted and stretched (and ``scaled``) to fit ``onto`` at the instants ``t``.
 
     The best of a grid of shifts and stretches, then of a finer one about it."""

@@ -98,10 +98,10 @@ class Trend:
         rising = bool(limit >= self.at(last))
         low, high = self.band(days)
         edge, line = (high, self.at(days)) if rising else (low, self.at(days))
-        return tuple(self._first(days, x, limit, rising) for x in (edge, line))  # type: ignore[return-value]
+        return tuple(self._first(days, x, limit, rising=rising) for x in (edge, line))  # type: ignore[return-value]
 
     @staticmethod
-    def _first(days, x, limit: float, rising: bool) -> float | None:
+    def _first(days, x, limit: float, *, rising: bool) -> float | None:
         passed = x >= limit if rising else x <= limit
         return float(days[np.argmax(passed)]) if passed.any() else None
 

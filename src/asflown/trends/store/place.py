@@ -80,7 +80,7 @@ def label(url: URL) -> str:
 
 def reach(url: URL, *, create: bool) -> tuple[Engine, Engine]:
     """Engines to read and to write with, on one pool.  ``create`` False: the file must be there."""
-    return _sqlite(url, create) if url.drivername == "sqlite" else _postgresql(url)
+    return _sqlite(url, create=create) if url.drivername == "sqlite" else _postgresql(url)
 
 
 @contextmanager
@@ -127,7 +127,7 @@ def wait_for_turn(connection: Connection) -> None:
         connection.execute(select(func.pg_advisory_xact_lock(_LOCK)))
 
 
-def _sqlite(url: URL, create: bool) -> tuple[Engine, Engine]:
+def _sqlite(url: URL, *, create: bool) -> tuple[Engine, Engine]:
     path = Path(os.path.realpath(str(url.database)))
     if create:
         check_place(path)

@@ -69,7 +69,7 @@ class TrendStore:
                 with store._reading.connect() as connection:
                     version = store._version(connection)
                 if version != HEAD:
-                    store._migrate(version, create)
+                    store._migrate(version, create=create)
                 elif create:
                     store._check_writable()
         except BaseException:
@@ -209,7 +209,7 @@ class TrendStore:
             )
         return None
 
-    def _migrate(self, version: str | None, create: bool) -> None:
+    def _migrate(self, version: str | None, *, create: bool) -> None:
         if version is None and not create:
             raise BadInput("there is no trend store", file=self, remedy="`asflown trend add` makes one.")
         from alembic import command
