@@ -204,7 +204,11 @@ def test_public_functions_name_their_options_and_are_documented():
         kinds = {p.kind for p in signature.parameters.values()}
         assert not kinds & {inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL}, name
         text = inspect.getdoc(function) or ""
-        for section in ("Parameters\n---", "Returns\n---", *(("Raises\n---",) if len(signature.parameters) > 1 else ())):
+        for section in (
+            "Parameters\n---",
+            "Returns\n---",
+            *(("Raises\n---",) if len(signature.parameters) > 1 else ()),
+        ):
             assert section in text, f"{name}: no {section.split()[0]}"
         undocumented = [p for p in signature.parameters if not re.search(rf"^(\w+, )*{p}(, \w+)*( :.*)?$", text, re.M)]
         assert not undocumented, f"{name}: {undocumented}"

@@ -148,7 +148,7 @@ def test_report_writes_a_page_and_its_twin(store, tmp_path):
         (("trend", "show", "--store", "STORE", "--limit", "angular_impulse=3 kg"), "does not convert"),
         (("trend", "show", "--store", "STORE", "--limit", "speed=3 N m"), "does not name a figure"),
         (("trend", "compare", "deploy-2004-12-09", "--store", "STORE"), "needs two events"),
-        (("trend", "compare", "deploy-2004-12-09", "x", "--store", "STORE"), "no deploy called 'x'"),
+        (("trend", "compare", "deploy-2004-12-09", "x", "--store", "STORE"), "no deploy 'x'"),
         (("trend", "watch", "--store", "STORE", "--event", "x"), "no event 'x'"),
         (("trend", "add", "missing.toml", "--store", "t.db"), "no such event list"),
         (("report", "missing.db", "--out", "r.html"), "no trend store"),

@@ -6,8 +6,8 @@ import pytest
 
 from asflown.kit.doubts import UNTOLD, Doubt, Doubts, Kind, Severity, doubt_from, grouped
 
-LOW = Kind("kit.test-low", Severity.NOTE, "{axis} was chosen")
-HIGH = Kind("kit.test-high", Severity.SUSPECT, "{channel} is off by {ratio:.2f} on {date}", "Check {channel}.")
+LOW = Kind("test.low", Severity.NOTE, "{axis} was chosen")
+HIGH = Kind("test.high", Severity.SUSPECT, "{channel} is off by {ratio:.2f} on {date}", "Check {channel}.")
 
 
 def test_a_doubt_is_a_sentence_with_numbers_and_names_apart():
@@ -24,9 +24,9 @@ def test_a_value_that_the_sentence_needs_must_be_told():
 
 
 def test_two_kinds_cannot_share_an_id():
-    with pytest.raises(ValueError, match=r"kit\.test-low"):
-        Kind("kit.test-low", Severity.VOID, "something else")
-    assert Kind("kit.test-low", Severity.NOTE, "{axis} was chosen") == LOW  # the same again, as on a reload
+    with pytest.raises(ValueError, match=r"test\.low"):
+        Kind("test.low", Severity.VOID, "something else")
+    assert Kind("test.low", Severity.NOTE, "{axis} was chosen") == LOW  # the same again, as on a reload
 
 
 def test_doubts_keep_order_drop_repeats_and_answer_by_kind():
@@ -58,9 +58,9 @@ def test_a_doubt_comes_back(way):
 
 
 def test_a_kind_of_another_version_keeps_sentence_and_severity():
-    record = LOW(axis="x").record() | {"kind": "kit.gone", "severity": "void"}
+    record = LOW(axis="x").record() | {"kind": "test.gone", "severity": "void"}
     d = doubt_from(record)
-    assert str(d) == "x was chosen" and d.severity is Severity.VOID and d.kind.id == "kit.gone"
+    assert str(d) == "x was chosen" and d.severity is Severity.VOID and d.kind.id == "test.gone"
 
 
 def test_doubts_that_differ_in_numbers_and_dates_group():

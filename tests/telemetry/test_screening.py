@@ -7,7 +7,7 @@ import pytest
 
 from asflown.kit.errors import BadInput
 from asflown.telemetry.findings import IMPLAUSIBLE
-from asflown.telemetry.screening import dropouts, gaps, needs_a_look, noise_sigma, quantisation_step, screen, summaries
+from asflown.telemetry.screening import dropouts, gaps, needs_a_look, quantisation_step, sample_noise, screen, summaries
 from flights import CASSINI, EPOCH, telemetry_of
 from telemetry.signals import noise
 
@@ -195,7 +195,7 @@ def test_rpm_labelled_rad_per_s_is_doubted():
 def test_noise_and_quantisation_are_measured():
     x = 1e-3 * np.sin(T / 50) + noise(500, 1e-5)
     c = one(x).channels["body_rate_x"]
-    assert noise_sigma(c) == pytest.approx(1e-5, rel=0.15)  # 3 sigma of a median of 500
+    assert sample_noise(c) == pytest.approx(1e-5, rel=0.15)  # 3 sigma of a median of 500
     for q in (0.4 * 2 * np.pi / 60, 5e-9, 1.0):
         assert quantisation_step(np.rint(noise(500, 30 * q) / q) * q) == pytest.approx(q, rel=1e-6)
     assert quantisation_step(noise(500)) == 0 and quantisation_step(np.ones(9)) == 0
