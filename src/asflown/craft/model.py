@@ -43,6 +43,7 @@ if TYPE_CHECKING:  # what the values are once loaded
     Metre2 = float
     MetrePerSecond = float
     ViscousDrag = float
+    NewtonMetrePerAmpere = float
     MetreVector = tuple[float, float, float]
     Direction = tuple[float, float, float]
     ModeCoupling = tuple[float, float, float]
@@ -52,6 +53,7 @@ else:  # how they are written in TOML
     Kilogram, Second, Newton, Hertz, Pascal = _in("kg"), _in("s"), _in("N"), _in("Hz"), _in("Pa")
     KilogramMetre2, NewtonMetre, NewtonMetreSecond = _in("kg m2"), _in("N m"), _in("N m s")
     Radian, RadianPerSecond, ViscousDrag = _in("rad"), _in("rad/s"), _in("N m s / rad")
+    NewtonMetrePerAmpere = _in("N m / A")
     Metre, Metre2, MetrePerSecond = _in("m"), _in("m2"), _in("m/s")
     MetreVector, Direction, ModeCoupling = _in("m", 3), _in("", 3), _in("kg(1/2) m", 3)
     InertiaElements, InertiaRatio = _in("kg m2", 6), _in("", 6)
@@ -174,6 +176,7 @@ class Wheel(_Data):
     valid_to: Date | None = None
     rate_limit: RadianPerSecond | None = None
     torque_limit: NewtonMetre | None = None
+    torque_constant: NewtonMetrePerAmpere | None = None  # of the motor
     drag: Drag = Drag()
     note: str = ""
 

@@ -31,6 +31,8 @@ class ChannelKind:
 
 KINDS = (
     ChannelKind("wheel_rate", "rad/s", "wheel", "wheel rate relative to the body", plausible=700.0, mistaken_for="rpm"),
+    ChannelKind("wheel_current", "A", "wheel", "wheel motor current"),
+    ChannelKind("wheel_torque", "N m", "wheel", "commanded wheel motor torque, on the wheel", plausible=10.0),
     ChannelKind("wheel_drag_torque", "N m", "wheel", "estimated bearing drag", plausible=1.0),
     ChannelKind("body_rate", "rad/s", "axis", "body rate, inertial", plausible=0.2, mistaken_for="mrad/s or deg/s"),
     ChannelKind("attitude_error", "rad", "axis", "commanded minus estimated attitude", plausible=0.1,
@@ -40,6 +42,11 @@ KINDS = (
     ChannelKind("controller_rate_error", "rad/s", "axis", "rate error with KP e added (cover paper eq 17)", plausible=0.05,
                 mistaken_for="mrad/s or deg/s"),
     ChannelKind("quaternion", "", "component", "attitude, body to inertial", plausible=1.001),
+    ChannelKind("commanded_rate", "rad/s", "axis", "commanded body rate, inertial", plausible=0.2, mistaken_for="mrad/s or deg/s"),
+    ChannelKind("commanded_quaternion", "", "component", "commanded attitude, body to inertial", plausible=1.001),
+    ChannelKind("magnetic_field", "T", "axis", "magnetic field, body axes", plausible=1e-3, mistaken_for="nT"),
+    ChannelKind("sun_direction", "", "axis", "unit vector to the Sun, body axes; zero in shadow", plausible=1.1),
+    ChannelKind("torque_rod_dipole", "A m2", "axis", "dipole of the torque rods, body axes"),
     ChannelKind("on_time", "s", "thruster", "cumulative commanded on-time", behaves="cumulative"),
     ChannelKind("pulse_count", "", "thruster", "cumulative pulses", behaves="cumulative"),
     ChannelKind("cover_angle", "rad", "mechanism", "mechanism angle", behaves="steps", plausible=7.0, mistaken_for="deg"),
