@@ -22,11 +22,11 @@ UNEXPLAINED = Kind(
 )  # fmt: skip
 KNOWN_OFF = Kind(
     "fused.known-off", Severity.SUSPECT,
-    "the data about {axis} put {quantity} {off_percent:+.1f} ± {sigma_percent:.1f} % off the value given",
+    "the data about {axis} suggest that {quantity} differs from the value given by {off_percent:+.1f} ± {sigma_percent:.1f} %",
     "Check the craft file, or give --consider {name} a larger sigma.",
 )  # fmt: skip
 DELAY_OFF = Kind(
-    "fused.delay-off", Severity.SUSPECT, "the data about {axis} put {quantity} {off_s:+.2f} ± {sigma_s:.2f} s off",
+    "fused.delay-off", Severity.SUSPECT, "the data about {axis} suggest that {quantity} differs from the value given by {off_s:+.2f} ± {sigma_s:.2f} s",
     "Check the time stamps, or give --consider {name} a larger sigma.",
 )  # fmt: skip
 
