@@ -23,12 +23,24 @@ class Run:
         return strict_json(self.out)
 
 
-def run(*words) -> Run:
-    """`asflown WORDS...` with its exit code and both its outputs."""
+#: Verbs that need a craft, but for the words after them that do not.
+NEED_CRAFT = {
+    *("torque", "wheels", "external-torque", "density", "jets", "leak", "thrust", "budget", "tune", "inertia", "gates"),
+    "trend add",
+}
+NEED_NONE = ("gates watch", "gates predict", "gates simulate", "gates history")
+
+
+def run(*words, craft: str | None = "cassini") -> Run:
+    """`asflown WORDS...` with its exit code and both its outputs; of Cassini unless the words or ``craft`` say otherwise."""
     from asflown.cli.main import main
 
     out, err = io.StringIO(), io.StringIO()
     argv = ["asflown", *map(str, words)]
+    verbs = {" ".join(argv[1:2]), " ".join(argv[1:3])}
+    bare = "--craft" in argv or "--help" in argv or verbs.intersection(NEED_NONE) or len(argv) == 2
+    if craft is not None and not bare and verbs.intersection(NEED_CRAFT):
+        argv += ["--craft", craft]
     code: object = 0
     with patch.object(sys, "argv", argv), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:
@@ -48,9 +60,9 @@ def strict_json(text: str) -> dict:
     return json.loads(text, parse_constant=refuse)
 
 
-def complaint(*words) -> str:
+def complaint(*words, craft: str | None = "cassini") -> str:
     """The one error message of a run that must be refused."""
-    done = run(*words)
+    done = run(*words, craft=craft)
     assert done.code == 2, (done.code, done.err[:600], done.out[:200])
     if "--json" in words:
         told = strict_json(done.out)

@@ -40,11 +40,11 @@ def budget(
     job = Job(context)
     names = [m.strip() for m in methods.split(",")] if methods else list(DEFAULT_METHODS)
     rises = numbers_of(widths, "--widths") if widths else None
-    plan = load_scenario(scenario)
+    plan, vehicle = load_scenario(scenario), job.craft
     with Progress(TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), console=Console(stderr=True),
                   transient=True) as bar:  # fmt: skip
         task = bar.add_task(f"{plan.name}: {runs} flights", total=runs * len(names) * len(rises or [None]))
         result = error_budget(
-            plan, job.craft, names, runs=runs, seed=seed, noise=noise, rises_s=rises, tick=lambda: bar.advance(task)
+            plan, vehicle, names, runs=runs, seed=seed, noise=noise, rises_s=rises, tick=lambda: bar.advance(task)
         )
     job.finish(result, inputs=inputs_of(scenario), options={"methods": names, "widths_s": widths})

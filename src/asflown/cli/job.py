@@ -17,7 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from .options import craft_from
 from .output import print_doubts, print_json, say
+from .project import Defaults
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -61,20 +63,12 @@ class Job:
 
     @cached_property
     def craft(self) -> Craft:
-        """The craft that --craft, --inertia and --cm name."""
+        """The craft that --craft or the project file names, with --inertia and --cm."""
         return self.craft_named(self.given["craft"])
 
-    def craft_named(self, name: str) -> Craft:
-        """A craft with --inertia and --cm in place of its own."""
-        from ..craft.load import load_craft
-        from ..kit.quantities import plain_numbers
-
-        inertia, cm = self.given.get("inertia"), self.given.get("cm")
-        return load_craft(
-            name,
-            inertia=plain_numbers(inertia, 6, "--inertia") if inertia is not None else None,
-            cm=plain_numbers(cm, 3, "--cm") if cm is not None else None,
-        )
+    def craft_named(self, name: str | None) -> Craft:
+        """A craft with --inertia and --cm in place of its own.  Raises BadInput where none is named."""
+        return craft_from(name, self.given.get("inertia"), self.given.get("cm"))
 
     def telemetry(self, file: Path | None = None) -> Telemetry:
         """Telemetry through the door, cut to the window; of the verb's ``file`` unless another is named."""
@@ -117,7 +111,7 @@ class Job:
         ``failed``: a check failed, which ends the program with exit code 3."""
         result = replace(
             result,
-            inputs=tuple(dict.fromkeys((*result.inputs, *inputs))),
+            inputs=tuple(dict.fromkeys((*result.inputs, *inputs, *Defaults.used))),
             options=self.options | (options or {}),
         )
         if self.given.get("store") is not None and entry is not None:
@@ -139,7 +133,7 @@ class Job:
         """The end of a verb whose result is no estimate: its ``record`` with doubts and provenance as JSON, or its text."""
         from ..kit.result import provenance
 
-        told = provenance(inputs, self.options | (options or {}), seed)
+        told = provenance((*inputs, *Defaults.used), self.options | (options or {}), seed)
         self._tell(record | doubts.record(), told, doubts, text)
 
     def _tell(self, record: dict, provenance: dict, doubts: Doubts, text: Callable[[], None]) -> None:

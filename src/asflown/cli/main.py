@@ -64,6 +64,15 @@ def _program(
         raise typer.Exit()
     if context.invoked_subcommand is None:
         print(context.get_help())
+        return
+    from . import project
+
+    project.Defaults.used = ()
+    file = project.found()
+    if file is not None:
+        from .project_file import defaults_from  # pydantic only where there is a file to check
+
+        context.default_map = defaults_from(file, context.command)
 
 
 def main() -> None:

@@ -6,7 +6,11 @@ from pathlib import Path
 
 import typer
 
-CRAFT = typer.Option("cassini", "--craft", help="A built-in craft (asflown craft list) or a TOML file.")
+CRAFT = typer.Option(
+    None,
+    "--craft",
+    help="A built-in craft (asflown craft list) or a TOML file; else that of the project file asflown.toml.",
+)
 INERTIA = typer.Option(
     None, "--inertia", help='Inertia used as given: "Ixx,Iyy,Izz,Ixy,Ixz,Iyz" in kg m2, tensor elements.'
 )
@@ -26,13 +30,26 @@ SPIN_SIGMA = typer.Option(None, "--spin-sigma", help="One sigma of a wheel's spi
 JSON = typer.Option(False, "--json", help="One JSON object on standard output.")
 
 
-def craft_from(name: str, inertia: str | None, cm: str | None):
+def craft_named(name: str | None) -> str:
+    """The name given, or that of the project.  Raises BadInput where there is neither."""
+    from ..kit.errors import BadInput
+
+    if name is None:
+        raise BadInput(
+            "no craft is named, and the answer depends on the craft",
+            remedy="Give --craft NAME (asflown craft list), or --craft FILE of your own (asflown craft new makes one), "
+            'or write craft = "NAME" into a project file asflown.toml.',
+        )
+    return name
+
+
+def craft_from(name: str | None, inertia: str | None, cm: str | None):
     """The craft that --craft, --inertia and --cm name."""
     from ..craft.load import load_craft
     from ..kit.quantities import plain_numbers
 
     return load_craft(
-        name,
+        craft_named(name),
         inertia=plain_numbers(inertia, 6, "--inertia") if inertia is not None else None,
         cm=plain_numbers(cm, 3, "--cm") if cm is not None else None,
     )

@@ -16,11 +16,12 @@ def print_json(record: dict) -> None:
 
 
 def provenance(inputs: dict[str, str], options: dict, seed=None) -> dict:
-    """Files (name -> SHA-256), versions, options and seed that made a result."""
+    """Files (name -> SHA-256), the project file where it was used, versions, options and seed that made a result."""
     from ..kit.result import Input
     from ..kit.result import provenance as told
+    from .project import Defaults
 
-    return told([Input(n, d) for n, d in inputs.items()], options, seed)
+    return told([*(Input(n, d) for n, d in inputs.items()), *Defaults.used], options, seed)
 
 
 def say(text: str = "") -> None:

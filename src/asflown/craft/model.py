@@ -78,6 +78,16 @@ def _utc_ns(value):
 Date = Annotated[int, BeforeValidator(_utc_ns)]  # int64 ns TAI
 
 
+def _share(value):
+    share = quantity(value, "")
+    if not 0 < share < 1:
+        raise ValueError(f'{value!r} is no share between 0 and 1: write 5 % as "5 %" or 0.05')
+    return share
+
+
+Share = Annotated[float, BeforeValidator(_share)]
+
+
 def tensor(elements) -> np.ndarray:
     """Ixx Iyy Izz Ixy Ixz Iyz -> 3 x 3."""
     xx, yy, zz, xy, xz, yz = elements
@@ -104,11 +114,20 @@ INTERPOLATED = Kind(
     "the inertia on {date} is interpolated by date between {before} and {after}: the propellant used in between is not known",
     "Give the inertia (--inertia), or the propellant ledger in the craft file.",
 )  # fmt: skip
+PREDICTED = Kind(
+    "craft.inertia-predicted", Severity.CAUTION,
+    "the inertia is predicted, not estimated in flight: it is used with one sigma of {sigma_percent:g} %{assumed}",
+    "Estimate it from slews (asflown inertia), or state its sigma in the craft file.",
+)  # fmt: skip
 NEAREST = Kind(
     "craft.inertia-nearest", Severity.CAUTION,
     "the inertia is that of {date}, the nearest known date of this configuration",
     "Give the inertia on the date of the telemetry: --inertia.",
 )  # fmt: skip
+
+
+#: One sigma of a predicted inertia whose entry states none, as a share: assumed, wide.
+PREDICTED_SHARE = 0.05
 
 
 def _day(tai_ns: int) -> str:
@@ -120,13 +139,16 @@ class _Data(BaseModel):
 
 
 class MassProperties(_Data):
-    """The inertia tensor on one date.  Entries of the same ``piece`` are interpolated."""
+    """The inertia tensor on one date.  Entries of the same ``piece`` are interpolated.
+
+    ``sigma``: one sigma of the tensor, as a share of its moments."""
 
     date: Date
     piece: str
     inertia: InertiaElements | None = None
     inertia_per_spin_inertia: InertiaRatio | None = None  # where only the ratio to the wheels' spin inertia is known
     basis: Literal["estimated", "predicted", "extrapolated", "inferred", "assumed"] = "estimated"
+    sigma: Share | None = None
     mass: Kilogram | None = None
     source: str = ""
     doubt: str = ""
@@ -141,6 +163,11 @@ class MassProperties(_Data):
     @property
     def elements(self):
         return self.inertia if self.inertia is not None else self.inertia_per_spin_inertia
+
+    @property
+    def share(self) -> float | None:
+        """One sigma as a share: the one stated, else that assumed of a prediction; None: not stated."""
+        return PREDICTED_SHARE if self.sigma is None and self.basis == "predicted" else self.sigma
 
 
 class InertiaRequirement(_Data):
@@ -417,6 +444,17 @@ class Craft(_Data):
         x, y, z = np.mean([t.position for t in self.thrusters], axis=0)
         return float(x), float(y), float(z)
 
+    @property
+    def mass_properties_used(self) -> tuple[MassProperties, ...]:
+        """Those that give the inertia, by date: the estimated, inferred and assumed ones; predicted ones where there are no others."""
+        flown = [m for m in self.mass_properties if m.basis != "predicted"]
+        return tuple(sorted(flown or self.mass_properties, key=lambda m: m.date))
+
+    @property
+    def inertia_share(self) -> float | None:
+        """One sigma of the inertia as a share, the widest of the entries used; None where none is stated or assumed."""
+        return max((m.share for m in self.mass_properties_used if m.share is not None), default=None)
+
     def mechanism(self, name: str) -> Mechanism:
         """The mechanism of that name.
 
@@ -561,11 +599,14 @@ class Craft(_Data):
         return CraftAt(self, tai_ns, I_B, relative, tuple(wheels), Doubts(doubts).passed_on_by("craft"))
 
     def _inertia_at(self, moment: int, doubts: list[Doubt]):
-        known = sorted((m for m in self.mass_properties if m.basis != "predicted"), key=lambda m: m.date)
+        known = self.mass_properties_used
         if not known:
             return None, False
         if known[0].piece == "given":
             return tensor(known[0].elements), False
+        if known[0].basis == "predicted":
+            assumed = " (assumed: none is stated)" if any(m.sigma is None for m in known) else ""
+            doubts.append(PREDICTED(sigma_percent=100 * (self.inertia_share or 0.0), assumed=assumed))
         before = [m for m in known if m.date <= moment]
         after = [m for m in known if m.date > moment]
         a = before[-1] if before else after[0]

@@ -71,6 +71,8 @@ def fit(
 
     job = Job(context)
     _check(patch, removed, report)
+    if store is not None:
+        job.craft_named(craft)  # whose entry it will be: before the work
     compared = None
     burns = maneuvers_from(file, engine, without)
     if patch is not None:

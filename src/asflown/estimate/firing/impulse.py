@@ -20,7 +20,7 @@ from ...kit.errors import BadInput
 from ...kit.regression import noise_sigma
 from ...kit.scatter import difference_sigma
 from ...telemetry.channels import AXES
-from ..subject import INERTIA_SHARE, samples_of
+from ..subject import samples_of
 from .chains import Chain, momentum_chain
 from .firings import Firings, firings_of
 from .priors import Priors, thrust_priors
@@ -84,7 +84,7 @@ def _on_wheels(subject: Subject, axis: str) -> Gained:
         columns=np.zeros((len(t) - 1, 0)),
         names=(),
         covariance=Covariance.of(main, -0.5 * main[1:]),
-        inertia_share=INERTIA_SHARE,
+        inertia_share=subject.inertia_share,
         settings={"momentum_noise_Nms": sigma},
         doubts=subject.doubts + s.doubts,
     )

@@ -132,6 +132,8 @@ def thrust_priors(
         )
     if center_sigma_m is not None and not min(center_sigma_m) > 0:
         raise BadInput("a sigma of the centre of mass is not positive", remedy="Give three lengths above zero.")
+    if inertia_share is None:
+        inertia_share = craft.inertia_share
     own = [t.fall for t in craft.thrusters if t.fall > 0]
     center_sigma_m = tuple(center_sigma_m or (CENTER_UNKNOWN if craft.stated_center is None else CENTER_SIGMA))
     return Priors(

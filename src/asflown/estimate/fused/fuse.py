@@ -160,7 +160,7 @@ def fused(
     record of more than 100 minutes (at 1 s)."""
     with needed():
         subject.known_inertia()
-    sizes = CONSIDERED | (considered or {})
+    sizes = CONSIDERED | {"inertia": subject.inertia_share} | (considered or {})
     found = _fused(subject, gather(subject, axes, loop), axes, prior, sizes, seed)
     if loop is not None or found.loop == "measured" or not found.unexplained:
         return found

@@ -110,6 +110,8 @@ def leak_known(
                     f"a sigma of {v:g} ({_OPTIONS[name]}) is not possible",
                     remedy="A share lies between 0 and 1 (0.02 is 2 %), any other sigma above zero.",
                 )
+    if craft.inertia_share is not None:
+        given.setdefault("inertia_share", craft.inertia_share)
     if craft.center_of_mass is None:
         given.setdefault("center_of_mass_m", CENTER_SIGMA)
     return Known(**given)

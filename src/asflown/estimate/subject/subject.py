@@ -12,6 +12,7 @@ from ...kit.doubts import Doubts, Kind, Severity
 from ...kit.errors import BadInput, some_of
 from ...kit.timeline import utc_label
 from .activity import slews, thrusters_firing
+from .assumed import INERTIA_SHARE
 
 if TYPE_CHECKING:
     from ...craft.model import Craft, CraftAt, Wheel
@@ -44,6 +45,12 @@ class Subject:
     def firing(self) -> list[str]:
         """Thrusters that fire in this record."""
         return thrusters_firing(self.telemetry)
+
+    @property
+    def inertia_share(self) -> float:
+        """One sigma of the inertia as a share: as the craft's file states it, else as assumed."""
+        stated = self.craft.craft.inertia_share
+        return INERTIA_SHARE if stated is None else stated
 
     def known_inertia(self) -> np.ndarray:
         """Raises BadInput where the craft's inertia is not known."""
