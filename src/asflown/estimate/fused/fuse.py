@@ -35,6 +35,7 @@ from .held_body import HeldBody
 from .innovations import Innovations, by_channel, considered_doubts, innovation_doubts
 from .levels import AxisFit, fit_doubts, fit_levels
 from .smooth_torque import gaussian_torque, widened
+from .turning import COMMAND_NOT_KNOWN, CommandNotKnown, check_turn
 
 PRIORS = ("edges", "matern", "wiener")
 
@@ -114,6 +115,7 @@ class _Motion:
     rate_variance: np.ndarray
     acceleration: np.ndarray
     stored_Nms: np.ndarray
+    torque_sigma_Nm: np.ndarray  # (3,), the median over the grid
 
 
 @dataclass(frozen=True)
@@ -161,7 +163,14 @@ def fused(
     with needed():
         subject.known_inertia()
     sizes = CONSIDERED | (considered or {})
-    found = _fused(subject, gather(subject, axes, loop), axes, prior, sizes, seed)
+    try:
+        found = _fused(subject, gather(subject, axes, loop), axes, prior, sizes, seed)
+    except CommandNotKnown as why:
+        doubt = COMMAND_NOT_KNOWN(**why.told)
+        if loop is not None:
+            raise BadInput(str(doubt), remedy="Use --loop measured.") from why
+        other = _fused(subject, gather(subject, axes, "measured"), axes, prior, sizes, seed)
+        return replace(other, doubts=Doubts([doubt, *other.doubts]))
     if loop is not None or found.loop == "measured" or not found.unexplained:
         return found
     other = _fused(subject, gather(subject, axes, "measured"), axes, prior, sizes, seed)
@@ -179,6 +188,8 @@ def _fused(
     bodies = {j: _body(subject, record, I_B[j, j], wiener=prior == "wiener") for j in record.series}
     fits = {j: fit_levels(bodies[j], record.series[j]) for j in bodies}
     motion, whole = _motion(bodies, fits, record), len(bodies) == 3
+    if record.loop == "modelled":
+        check_turn(record.series, motion.rate, I_B, motion.stored_Nms, motion.torque_sigma_Nm)
     coupling = _Coupling.of(motion, I_B, whole=whole)
     if whole and not record.together:
         fits = _carried(subject, axes, record, motion, fits)
@@ -235,6 +246,7 @@ def _body(subject: Subject, record: Record, inertia_kgm2: float, *, wiener: bool
 def _motion(bodies: dict[int, Body], fits: dict[int, AxisFit], record: Record) -> _Motion:
     """From one smoothing of each axis under its fitted levels."""
     rate, variance, acceleration, stored = np.zeros((4, record.grid.count, 3))
+    sigma = np.full(3, np.inf)
     for j, body in bodies.items():
         axis = AxisData.of(body, fits[j].levels, fits[j].series, record.grid.seconds)
         best, wanted = smooth(axis.model, axis.data), axis.times.wanted
@@ -243,11 +255,12 @@ def _motion(bodies: dict[int, Body], fits: dict[int, AxisFit], record: Record) -
         F[body.torque, body.slope] = 1
         rate[:, j], acceleration[:, j] = x[:, body.RATE], x @ F[body.RATE]
         variance[:, j] = best.covariance[wanted, body.RATE, body.RATE]
+        sigma[j] = body.inertia_kgm2 * np.sqrt(np.median(best.covariance[wanted, body.torque, body.torque]))
         if not record.pushed:
             stored[:, j] = record.start_Nms[j] + body.inertia_kgm2 * x[:, body.STORED]
     if not (np.isfinite(rate).all() and np.isfinite(acceleration).all() and variance.min() >= 0):
         raise _not_fitted()
-    return _Motion(rate, variance, acceleration, stored)
+    return _Motion(rate, variance, acceleration, stored, sigma)
 
 
 def _not_fitted() -> CannotFuse:
