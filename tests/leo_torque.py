@@ -34,9 +34,15 @@ def _rows(name):
 def craft(folder, name="nadir-eclipse", controller=CONTROLLER):
     """As an analyst would describe it: CAD inertia, wheels, and what is known of its controller."""
     said = told(name)["told"]
-    I = np.array(said["inertia_cad_kgm2"])
-    text = ['name = "kestrel"', 'description = "small satellite"', "[[mass_properties]]", 'date = "2026-01-01"', 'piece = "flight"']
-    text.append('inertia = "{} {} {} {} {} {} kg m2"'.format(I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]))
+    I_B = np.array(said["inertia_cad_kgm2"])
+    text = [
+        'name = "kestrel"',
+        'description = "small satellite"',
+        "[[mass_properties]]",
+        'date = "2026-01-01"',
+        'piece = "flight"',
+    ]
+    text.append(f'inertia = "{I_B[0, 0]} {I_B[1, 1]} {I_B[2, 2]} {I_B[0, 1]} {I_B[0, 2]} {I_B[1, 2]} kg m2"')
     for wheel, axis in zip(_WHEELS, said["wheel_axes"], strict=True):
         text += ["[[wheels]]", f'name = "{wheel}"', 'axis = "{} {} {}"'.format(*axis), 'spin_inertia = "0.00042 kg m2"']
     path = folder / "kestrel.toml"
@@ -54,7 +60,9 @@ def record(folder, name="nadir-eclipse", start_s=0.0, stop_s=np.inf, without=(),
     kept = {k: v for k, v in columns.items() if not k.startswith(tuple(without))}
     t = seconds(name)
     use = np.flatnonzero((t >= start_s) & (t <= stop_s))
-    extra = {} if commanded is None else {f"commanded_rate_{a} [rad/s]": commanded(t)[:, j] for j, a in enumerate("xyz")}
+    extra = (
+        {} if commanded is None else {f"commanded_rate_{a} [rad/s]": commanded(t)[:, j] for j, a in enumerate("xyz")}
+    )
     path = folder / f"{name}-{start_s:g}.csv"
     with path.open("w") as f:
         f.write(f"# epoch: {rows[0]['UTC'].rstrip('Z')} UTC\n" + ",".join(["time [s]", *kept, *extra]) + "\n")

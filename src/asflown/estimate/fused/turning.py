@@ -20,10 +20,10 @@ _COUNTS = 0.1
 #: The mean rate left out is told from the sensor's noise where it is more than this. [sigma]
 _SURE = 4.0
 
-COMMAND_NOT_KNOWN = Kind(
-    "fused.command-not-known", Severity.NOTE,
+COMMAND_SMOOTHED = Kind(
+    "fused.command-smoothed", Severity.NOTE,
     "the craft turns (rate x H about {axis} is {torque_Nm:.2g} N m, sigma {sigma_Nm:.2g} N m) and its commanded motion is not "
-    "in the telemetry: the loop is not modelled, and the actuators' action is taken as measured",
+    "in the telemetry: it is taken to be the smoothed body rates, which is right in a hold",
     "Add commanded_rate_x, _y and _z.",
 )  # fmt: skip
 
@@ -37,7 +37,11 @@ class CommandNotKnown(Exception):
 
 
 def check_turn(
-    series: dict[int, Sequence[Series]], modelled: np.ndarray, I_B: np.ndarray, stored_Nms: np.ndarray, sigma_Nm: np.ndarray
+    series: dict[int, Sequence[Series]],
+    modelled: np.ndarray,
+    I_B: np.ndarray,
+    stored_Nms: np.ndarray,
+    sigma_Nm: np.ndarray,
 ) -> None:
     """Raises CommandNotKnown where the mean rate that the model leaves out, crossed into the momentum, counts beside the sigma.
 
