@@ -66,12 +66,17 @@ def show(
         print(wrapped("                ", f"delay, rise, fall {timing} ms: {', '.join(names)}"))
     if k := c.wheel_controller:
         print(f"  wheel controller: {k.bandwidth:g} Hz, damping {k.damping:g}, KP {k.kp_per_s:.6f} 1/s, KD {k.kd_per_s:.6f} 1/s\n"
-              f"                    rate filter {k.rate_filter.natural_frequency:g} rad/s, damping {k.rate_filter.damping:g}, every {k.period:g} s")  # fmt: skip
+              f"                    {_filter(k)}, {'period not known' if k.period is None else f'every {k.period:g} s'}")  # fmt: skip
     for m in c.mechanisms:
         print(
             f"  mechanism {m.name}: {m.mass:g} kg at ({m.from_cm[0]:+.3f} {m.from_cm[1]:+.3f} {m.from_cm[2]:+.3f}) m from the centre of mass"
         )
     print_doubts(now.doubts)
+
+
+def _filter(law) -> str:
+    f = law.rate_filter
+    return "no rate filter" if f is None else f"rate filter {f.natural_frequency:g} rad/s, damping {f.damping:g}"
 
 
 def _by_timing(thrusters) -> dict[str, list[str]]:
@@ -99,6 +104,11 @@ def check(file: str = typer.Argument(help="A craft TOML file."), json: bool = JS
     print_doubts(now.doubts)
 
 
+def _of_filter(craft, what: str):
+    """A number of the rate filter; None where there is none."""
+    return getattr(craft.wheel_controller.rate_filter, what, None)
+
+
 def _record(c, now, at) -> dict:
     inertia = plain(now.inertia_kgm2)
     return {
@@ -114,8 +124,8 @@ def _record(c, now, at) -> dict:
         "wheel_controller": c.wheel_controller and {
             "bandwidth_Hz": c.wheel_controller.bandwidth, "damping": c.wheel_controller.damping,
             "kp_per_s": c.wheel_controller.kp_per_s, "kd_per_s": c.wheel_controller.kd_per_s,
-            "filter_rad_s": c.wheel_controller.rate_filter.natural_frequency,
-            "filter_damping": c.wheel_controller.rate_filter.damping, "period_s": c.wheel_controller.period,
+            "filter_rad_s": _of_filter(c, "natural_frequency"), "filter_damping": _of_filter(c, "damping"),
+            "period_s": c.wheel_controller.period,
         },
         "center_of_mass_m": c.center_of_mass,
         "center_of_mass_assumed_m": c.center_of_mass_assumed,

@@ -97,7 +97,7 @@ class CraftRecord(TypedDict):
     inertia_per_spin_inertia: Rows | None
     wheels: list[WheelRecord]
     thrusters: list[ThrusterRecord]
-    wheel_controller: dict[str, Number] | None
+    wheel_controller: dict[str, Number | None] | None
     center_of_mass_m: Vector | None
     center_of_mass_assumed_m: Vector | None
 

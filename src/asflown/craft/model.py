@@ -278,8 +278,10 @@ class WheelController(_Data):
 
     bandwidth: Hertz = Field(gt=0)
     damping: float = Field(gt=0)
-    rate_filter: RateFilter
-    period: Second = Field(gt=0)
+    rate_filter: RateFilter | None = None  # None: the rate itself
+    period: Second | None = Field(default=None, gt=0)  # None: not known
+    gyroscopic: bool | None = None  # whether w x H is fed forward; None: not known
+    acceleration: bool | None = None  # whether inertia x commanded acceleration is
 
     @property
     def natural_frequency_rad_s(self) -> float:

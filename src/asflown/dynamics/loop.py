@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 
 
 def filter_section(controller: WheelController) -> np.ndarray:
-    """s^2 + 2 z w s + w^2 of the rate filter, highest power first."""
+    """s^2 + 2 z w s + w^2 of the rate filter, highest power first; 1 where there is none."""
     f = controller.rate_filter
+    if f is None:
+        return np.array([1.0])
     return np.array([1.0, 2 * f.damping * f.natural_frequency, f.natural_frequency**2])
 
 
@@ -108,6 +110,8 @@ def _root(gramian):
 
 def filtered_rate(controller: WheelController, rate: np.ndarray, step_s: float) -> np.ndarray:
     """F(s) applied to an evenly sampled rate (linear between samples), at rest at its first value."""
+    if controller.rate_filter is None:
+        return np.array(rate, float)
     section = filter_section(controller)
     A, B, C, D = signal.tf2ss([section[-1]], section)
     Ad, Bd, Cd, Dd, _ = signal.cont2discrete((A, B, C, D), step_s, method="foh")

@@ -190,12 +190,13 @@ def _check_complete(tlm: Telemetry, names: list[str]) -> None:
 
 def control_step_s(craft: Craft) -> float:
     """The craft's control step, of which pulses are multiples; assumed where it has no controller. [s]"""
-    return craft.wheel_controller.period if craft.wheel_controller else _CONTROL_STEP_S
+    law = craft.wheel_controller
+    return _CONTROL_STEP_S if law is None or law.period is None else law.period
 
 
 def step_of(craft: Craft, on_time_s) -> float:
     """The control step [s]: the craft's, or the smallest rise of an on-time."""
-    if craft.wheel_controller is not None:
+    if craft.wheel_controller is not None and craft.wheel_controller.period is not None:
         return control_step_s(craft)
     rises = np.diff(on_time_s, axis=0)
     return float(rises[rises > _ROUNDING].min())

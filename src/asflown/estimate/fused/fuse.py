@@ -18,6 +18,7 @@ share, which a one-axis model would take for a disturbance; a second pass solves
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -35,6 +36,10 @@ from .held_body import HeldBody
 from .innovations import Innovations, by_channel, considered_doubts, innovation_doubts
 from .levels import AxisFit, fit_doubts, fit_levels
 from .smooth_torque import gaussian_torque, widened
+from .turning import COMMAND_SMOOTHED, CommandNotKnown, check_turn
+
+if TYPE_CHECKING:
+    from .command import Command
 
 PRIORS = ("edges", "matern", "wiener")
 
@@ -114,6 +119,7 @@ class _Motion:
     rate_variance: np.ndarray
     acceleration: np.ndarray
     stored_Nms: np.ndarray
+    torque_sigma_Nm: np.ndarray  # (3,), the median over the grid
 
 
 @dataclass(frozen=True)
@@ -127,13 +133,17 @@ class _Coupling:
     momentum_Nms: np.ndarray
 
     @classmethod
-    def of(cls, motion: _Motion, I_B: np.ndarray, *, whole: bool) -> _Coupling:
+    def of(cls, motion: _Motion, I_B: np.ndarray, command: Command | None = None, *, whole: bool) -> _Coupling:
         """``whole``: all axes' motion is known; else no torque is taken off."""
         H = motion.rate @ I_B + motion.stored_Nms
         torque = np.zeros_like(H)
         if whole:
             torque = motion.acceleration @ (I_B - np.diag(np.diag(I_B))) + np.cross(motion.rate, H)
-        return cls(torque, motion.rate_variance @ (np.mean(H**2, axis=0) * (1 - np.eye(3))), H)
+        variance = motion.rate_variance @ (np.mean(H**2, axis=0) * (1 - np.eye(3)))
+        if command is not None:
+            variance = variance + command.variance[1] * np.diag(I_B) ** 2
+            torque += command.acceleration * np.diag(I_B) - command.feed_Nm
+        return cls(torque, variance, H)
 
     def known(self, grid: Grid, j: int) -> Known | None:
         """The torque about an axis that has to be taken off first; None for none."""
@@ -161,7 +171,11 @@ def fused(
     with needed():
         subject.known_inertia()
     sizes = CONSIDERED | {"inertia": subject.inertia_share} | (considered or {})
-    found = _fused(subject, gather(subject, axes, loop), axes, prior, sizes, seed)
+    try:
+        found = _fused(subject, gather(subject, axes, loop), axes, prior, sizes, seed)
+    except CommandNotKnown as why:
+        found = _fused(subject, gather(subject, axes, loop, follow=True), axes, prior, sizes, seed)
+        found = replace(found, doubts=Doubts([COMMAND_SMOOTHED(**why.told), *found.doubts]))
     if loop is not None or found.loop == "measured" or not found.unexplained:
         return found
     other = _fused(subject, gather(subject, axes, "measured"), axes, prior, sizes, seed)
@@ -179,7 +193,9 @@ def _fused(
     bodies = {j: _body(subject, record, I_B[j, j], wiener=prior == "wiener") for j in record.series}
     fits = {j: fit_levels(bodies[j], record.series[j]) for j in bodies}
     motion, whole = _motion(bodies, fits, record), len(bodies) == 3
-    coupling = _Coupling.of(motion, I_B, whole=whole)
+    if record.loop == "modelled" and record.command is None:
+        check_turn(record.series, motion.rate, I_B, motion.stored_Nms, motion.torque_sigma_Nm)
+    coupling = _Coupling.of(motion, I_B, record.command, whole=whole)
     if whole and not record.together:
         fits = _carried(subject, axes, record, motion, fits)
     seeds = np.random.default_rng(seed).spawn(3)
@@ -195,7 +211,7 @@ def _fused(
         found += [*fit_doubts(AXES[j], fits[j]), *s.doubts]
     start_s = float(grid.from_epoch(subject.telemetry)[0])
     settings = {
-        "prior": prior, "loop": record.loop, "seed": seed, "unexplained_channels": len(unexplained),
+        "prior": prior, "loop": record.loop, **_followed(record.command), "seed": seed, "unexplained_channels": len(unexplained),
         **_settings({AXES[j]: (fits[j], s) for j, s in solved.items()}),
     }  # fmt: skip
     return Fusion(
@@ -204,6 +220,13 @@ def _fused(
         {AXES[j]: replace(s.data, start_s=start_s) for j, s in solved.items()},
         record.loop, unexplained, settings, record.doubts + found,
     )  # fmt: skip
+
+
+def _followed(command: Command | None) -> dict:
+    if command is None:
+        return {}
+    fed = {"gyroscopic": command.gyroscopic, "acceleration": command.acceleration_fed}
+    return {"command": command.source, "feed_forward": fed}
 
 
 def _prior_for(grid: Grid, prior: str | None) -> tuple[str, Doubt | None]:
@@ -235,6 +258,7 @@ def _body(subject: Subject, record: Record, inertia_kgm2: float, *, wiener: bool
 def _motion(bodies: dict[int, Body], fits: dict[int, AxisFit], record: Record) -> _Motion:
     """From one smoothing of each axis under its fitted levels."""
     rate, variance, acceleration, stored = np.zeros((4, record.grid.count, 3))
+    sigma = np.full(3, np.inf)
     for j, body in bodies.items():
         axis = AxisData.of(body, fits[j].levels, fits[j].series, record.grid.seconds)
         best, wanted = smooth(axis.model, axis.data), axis.times.wanted
@@ -243,11 +267,16 @@ def _motion(bodies: dict[int, Body], fits: dict[int, AxisFit], record: Record) -
         F[body.torque, body.slope] = 1
         rate[:, j], acceleration[:, j] = x[:, body.RATE], x @ F[body.RATE]
         variance[:, j] = best.covariance[wanted, body.RATE, body.RATE]
+        sigma[j] = body.inertia_kgm2 * np.sqrt(np.median(best.covariance[wanted, body.torque, body.torque]))
         if not record.pushed:
             stored[:, j] = record.start_Nms[j] + body.inertia_kgm2 * x[:, body.STORED]
+    if (c := record.command) is not None:
+        rate, acceleration, stored, variance = (
+            rate + c.rate, acceleration + c.acceleration, stored - c.fed_Nms, variance + c.variance[0]
+        )  # fmt: skip
     if not (np.isfinite(rate).all() and np.isfinite(acceleration).all() and variance.min() >= 0):
         raise _not_fitted()
-    return _Motion(rate, variance, acceleration, stored)
+    return _Motion(rate, variance, acceleration, stored, sigma)
 
 
 def _not_fitted() -> CannotFuse:
@@ -264,7 +293,10 @@ def _carried(subject: Subject, axes, record: Record, motion: _Motion, fits: dict
     def stored(t):
         return np.column_stack([np.interp(t, at, motion.stored_Nms[:, j]) for j in range(3)])
 
-    again = {j: series[-1] for j, series in gather(subject, axes, record.loop, stored).series.items()}
+    again = {
+        j: series[-1]
+        for j, series in gather(subject, axes, record.loop, stored, follow=record.command is not None).series.items()
+    }
     return {
         j: replace(f, series=tuple(again[j] if s.row == again[j].row else s for s in f.series)) for j, f in fits.items()
     }

@@ -14,10 +14,11 @@ from ...kit.errors import BadInput, some_of
 from ...kit.timeline import NS
 from ...telemetry.channels import AXES
 from ..subject import GAPS_BRIDGED, Grid, Subject, actuators, gap_doubts, gaps_on_grid, grid_for, splined
+from .command import Command, command_of, errors_from_quaternions, has_attitudes, has_command
 from .series import ATTITUDE_ERROR, BODY_RATE, CONTROL_TORQUE, MOMENTUM, Series
 
 if TYPE_CHECKING:
-    from ...telemetry.telemetry import Channel
+    from ...telemetry.telemetry import Channel, Telemetry
 
 LOOPS = ("modelled", "measured")
 
@@ -58,7 +59,8 @@ class Record:
 
     ``loop``: whether the controller is modelled, or the actuators' action only measured; ``pushed``: they are
     known by their torque, not their momentum; ``start_Nms``: their momentum (3,), taken off the series;
-    ``together``: whether all actuators are read at the same instants."""
+    ``together``: whether all actuators are read at the same instants; ``command``: the motion taken off the series of a
+    modelled loop, where the craft is commanded to move."""
 
     grid: Grid
     loop: str
@@ -67,15 +69,22 @@ class Record:
     start_Nms: np.ndarray
     together: bool
     doubts: Doubts
+    command: Command | None = None
 
 
 def gather(
-    subject: Subject, axes: tuple[int, ...], loop: str | None = None, stored_Nms: Stored | None = None
+    subject: Subject,
+    axes: tuple[int, ...],
+    loop: str | None = None,
+    stored_Nms: Stored | None = None,
+    *,
+    follow: bool = False,
 ) -> Record:
     """All axes where their channels are there, else those asked for.
 
     ``loop``: one of LOOPS, or None: modelled where that is possible.  ``stored_Nms``: the actuators' momentum as known so
-    far, which carries the samples of wheels read at different instants to common ones.
+    far, which carries the samples of wheels read at different instants to common ones.  ``follow``: the craft is commanded
+    to turn, also where the telemetry does not say so.
 
     Raises CannotFuse where a channel is missing, silent or short, BadInput for a loop that cannot be modelled."""
     tlm = subject.telemetry
@@ -83,7 +92,8 @@ def gather(
     if tlm.has_axes("body_rate"):
         axes = (0, 1, 2)
     loop, not_modelled = _loop(subject, axes, loop, pushed=bool(pushed))
-    rows = [(ATTITUDE_ERROR, "attitude_error")] if loop == "modelled" else []
+    pointed = loop == "modelled" and not _missing_errors(tlm, axes)
+    rows = [(ATTITUDE_ERROR, "attitude_error")] if pointed else []
     rows += [(BODY_RATE, "body_rate"), *([(CONTROL_TORQUE, "control_torque")] if pushed else [])]
     with needed():
         channels = {(row, j): tlm.channel(f"{stem}_{AXES[j]}") for row, stem in rows for j in axes}
@@ -91,16 +101,23 @@ def gather(
         grid = grid_for(everything)
     _check(grid, everything)
     series = {j: [_series(row, c, grid) for (row, i), c in channels.items() if i == j] for j in axes}
+    if loop == "modelled" and not pointed:
+        from_attitude = errors_from_quaternions(subject, grid)
+        series = {j: [from_attitude[j], *of_axis] for j, of_axis in series.items()}
     momentum = _momentum(stored, grid, stored_Nms)
     for j, of_axis in momentum.series().items():
         if j in series:
             series[j].append(of_axis)
     if loop == "measured":  # where wheels stick and tear loose, the jitter of sampling instants matters
         series = {j: [s.with_jumps() for s in of_axis] for j, of_axis in series.items()}
+    command = None
+    if loop == "modelled" and len(series) == 3 and (follow or has_command(subject)):
+        command = command_of(subject, grid, series, (momentum.seconds, momentum.values_Nms))
+        series = command.taken_off(series)
     silent = {g: c.name for c in everything for g in gaps_on_grid(c, grid)}
     carried = None if momentum.together or stored_Nms is not None else WHEELS_CARRIED()
     doubts = Doubts([*found, not_modelled, carried, *gap_doubts(tlm, grid, silent, GAPS_BRIDGED)])
-    return Record(grid, loop, bool(pushed), series, momentum.start, momentum.together, doubts)
+    return Record(grid, loop, bool(pushed), series, momentum.start, momentum.together, doubts, command)
 
 
 def _actuators(subject: Subject):
@@ -133,15 +150,19 @@ def _loop_unknown(subject: Subject, axes, *, pushed: bool) -> tuple[str, str] | 
     if subject.craft.craft.wheel_controller is None:
         what = f"{subject.craft.craft.name} has no wheel controller described"
         return what, "Describe it under [wheel_controller] in the craft file"
-    missing = [f"attitude_error_{AXES[j]}" for j in axes if f"attitude_error_{AXES[j]}" not in tlm]
-    if missing:
+    missing = _missing_errors(tlm, axes)
+    if missing and not has_attitudes(subject):
         return f"{some_of(missing)} is not in the telemetry", "Add the channel"
-    if subject.slewing:
+    if subject.slewing and not (has_command(subject) and tlm.has_axes("body_rate")):
         what = "the craft slews, and the loop's commanded motion is not in the telemetry"
         return what, "Narrow the window to a hold with --start and --stop"
     if subject.firing:
         return "thrusters fire, and may hold the attitude in place of the wheels", "Narrow the window to a span without"
     return None
+
+
+def _missing_errors(tlm: Telemetry, axes) -> list[str]:
+    return [f"attitude_error_{AXES[j]}" for j in axes if f"attitude_error_{AXES[j]}" not in tlm]
 
 
 def _check(grid: Grid, everything: list[Channel]) -> None:

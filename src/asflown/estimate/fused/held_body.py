@@ -46,7 +46,7 @@ class LoopLevels(Levels):
 class HeldBody(Body):
     """A body whose controller is known.
 
-    ``delay_s``: of the loop beyond its rate filter, to first order; zero but for asking what a delay would do."""
+    ``filter_rad_s``: infinite where the rate is not filtered.  ``delay_s``: of the loop beyond its rate filter, to first order; zero but for asking what a delay would do."""
 
     kp_per_s: float
     kd_per_s: float
@@ -64,17 +64,20 @@ class HeldBody(Body):
         f = controller.rate_filter
         return cls(
             inertia_kgm2=inertia_kgm2, wiener=wiener, kp_per_s=controller.kp_per_s, kd_per_s=controller.kd_per_s,
-            filter_rad_s=f.natural_frequency, filter_damping=f.damping,
+            filter_rad_s=f.natural_frequency if f else np.inf, filter_damping=f.damping if f else 1.0,
         )  # fmt: skip
 
     def dynamics(self, v: LoopLevels) -> tuple[np.ndarray, np.ndarray]:
         z = self.filter_damping
-        w = 4 * z / (4 * z / self.filter_rad_s + self.delay_s)  # the cascade's delay is 4 z / w
+        late_s = 4 * z / self.filter_rad_s + self.delay_s  # the cascade's delay is 4 z / w
+        w = 4 * z / late_s if late_s else 1.0
         stiffness = -self.kd_per_s * self.kp_per_s
         F, Q = np.zeros((2, _STATES, _STATES))
         F[_ATTITUDE, _RATE] = 1
         F[_RATE, [_ATTITUDE, _ERROR, _FILTER + 2, _TORQUE]] = stiffness, stiffness, -self.kd_per_s, 1
         F[_RATE, _RATE] = -stiffness * self.delay_s
+        if not late_s:  # the rate itself; what passes the filter goes nowhere
+            F[_RATE, [_FILTER + 2, _RATE]] = 0, -self.kd_per_s
         F[_STORED] = -F[_RATE]
         F[_STORED, _TORQUE] = 0
         for stage, source in ((_FILTER, _RATE), (_FILTER + 2, _FILTER)):

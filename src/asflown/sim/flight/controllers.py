@@ -12,6 +12,7 @@ from ...kit.errors import BadInput
 from .plant import Loop
 
 if TYPE_CHECKING:
+    from ...craft.model import WheelController
     from ..scenario import Scenario
 
 
@@ -33,6 +34,13 @@ def rate_filter(natural_rad_s: float, damping: float, period_s: float, rule: str
     return np.ascontiguousarray(a), np.ascontiguousarray(b[:, 0]), np.ascontiguousarray(c[0]), float(d[0, 0])
 
 
+def _rate_filter_of(law: WheelController, period_s: float, rule: str):
+    """As ``rate_filter``; the rate goes through where the law has none."""
+    if law.rate_filter is None:
+        return np.zeros((2, 2)), np.zeros(2), np.zeros(2), 1.0
+    return rate_filter(law.rate_filter.natural_frequency, law.rate_filter.damping, period_s, rule)
+
+
 def wheel_loop(scenario: Scenario, now: CraftAt) -> Loop:
     """The controller of a craft on a date, with what the scenario says otherwise.
 
@@ -49,10 +57,13 @@ def wheel_loop(scenario: Scenario, now: CraftAt) -> Loop:
             f"the {len(axes)} wheels of {now.craft.name} do not span three axes on this date",
             remedy="Fly a date or a craft with three independent wheels.",
         )
-    if not 0 < (run.period or law.period) <= 10:
-        raise BadInput("the control period must lie between 0 and 10 s", remedy="Cassini's is 0.125 s.")
     period = run.period or law.period
-    a, b, c, d = rate_filter(law.rate_filter.natural_frequency, law.rate_filter.damping, period, run.filter)
+    if period is None or not 0 < period <= 10:
+        raise BadInput(
+            "the control period must be known and lie between 0 and 10 s",
+            remedy="Give period under [wheel_controller], or in the scenario.",
+        )
+    a, b, c, d = _rate_filter_of(law, period, run.filter)
     believed = now.inertia_kgm2 if run.inertia is None else tensor(run.inertia)
     natural = run.friction_bandwidth if run.friction_compensation else 0.0
     return Loop(

@@ -1,0 +1,204 @@
+"""The motion that the controller follows, and the torque it adds to follow it.
+
+Of a body at rate w = w_c + d, w_c commanded, I d' = T - w x H - I w_c' + u.  The controller's u is that of a hold on the
+deviation d, plus a feed-forward f that is known from w_c and H: with h + integral of f in place of the wheels' momentum h,
+and w x H + I w_c' - f taken off as a known torque, the model of a hold serves for any motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import ndimage
+from scipy.integrate import cumulative_trapezoid
+from scipy.interpolate import BSpline, make_lsq_spline, make_smoothing_spline
+from scipy.spatial.transform import Rotation, Slerp
+
+from ...kit.rotations import attitude_error, rates_between, rotation, turned_by
+from ...telemetry.attitude import together
+from ...telemetry.channels import AXES
+from .series import ATTITUDE_ERROR, BODY_RATE, MOMENTUM, Series
+
+if TYPE_CHECKING:
+    from ...craft.model import WheelController
+    from ..subject import Grid, Subject
+
+_QUATERNION = [f"quaternion_{m}" for m in "wxyz"]
+_COMMANDED = [f"commanded_quaternion_{m}" for m in "wxyz"]
+#: The command of a hold is smoothed over this, and over so many times the loop's own. [s], [loop times]
+_SMOOTHED_S, _LOOP_TIMES = 300.0, 50.0
+#: Shortest block whose mean is smoothed. [s]
+_BLOCK_S = 10.0
+
+
+@dataclass(frozen=True)
+class Command:
+    """On the grid: rates, their derivative and the feed-forward on the body, (M, 3); variance of the rates and of their derivatives (2, 3).
+
+    ``source``: where the rates are from; ``gyroscopic``, ``acceleration``: what the controller feeds forward."""
+
+    seconds: np.ndarray
+    rate: np.ndarray
+    acceleration: np.ndarray
+    feed_Nm: np.ndarray
+    fed_Nms: np.ndarray  # its integral
+    variance: np.ndarray
+    source: str
+    gyroscopic: bool
+    acceleration_fed: bool
+
+    def on(self, seconds: np.ndarray, values: np.ndarray, j: int) -> np.ndarray:
+        return np.interp(seconds, self.seconds, values[:, j])
+
+    def taken_off(self, series: dict[int, list[Series]]) -> dict[int, list[Series]]:
+        """The series as a hold would have them."""
+        return {j: [self._as_in_a_hold(s, j) for s in of_axis] for j, of_axis in series.items()}
+
+    def _as_in_a_hold(self, s: Series, j: int) -> Series:
+        if s.row == BODY_RATE:
+            off = s.values - self.on(s.seconds, self.rate, j)
+            return replace(s, values=off - np.median(off))  # the sensor's bias
+        if s.row == MOMENTUM:
+            return replace(s, values=s.values + self.on(s.seconds, self.fed_Nms, j))
+        return s
+
+
+def has_command(subject: Subject) -> bool:
+    """Whether the telemetry tells what is commanded."""
+    tlm = subject.telemetry
+    return tlm.has_axes("commanded_rate") or all(n in tlm for n in _COMMANDED)
+
+
+def has_attitudes(subject: Subject) -> bool:
+    """Whether the telemetry tells the attitude and the commanded one."""
+    return all(n in subject.telemetry for n in (*_QUATERNION, *_COMMANDED))
+
+
+def errors_from_quaternions(subject: Subject, grid: Grid) -> dict[int, Series]:
+    """The error of the telemetered attitude against the commanded one."""
+    tai_ns, q = together(subject.telemetry, [*_QUATERNION, *_COMMANDED])
+    s = grid.of(tai_ns)
+    inside = (s >= 0) & (s <= grid.seconds[-1] + 1e-6)
+    error = attitude_error(q[inside, 4:], q[inside, :4])
+    return {j: Series(ATTITUDE_ERROR, s[inside], error[:, j]) for j in range(3)}
+
+
+def command_of(
+    subject: Subject, grid: Grid, series: dict[int, list[Series]], stored: tuple[np.ndarray, np.ndarray]
+) -> Command:
+    """What the craft is commanded to do; ``stored``: instants (N,) and the actuators' momentum there (N, 3).
+
+    From the channel, the commanded attitude, or the smoothed body rates, which is right in a hold alone."""
+    law, I_B = subject.controller(), subject.known_inertia()
+    rate, acceleration, variance, source = _commanded(subject, grid, series, law)
+    at = grid.seconds
+    h = np.column_stack([np.interp(at, stored[0], stored[1][:, j]) for j in range(3)])
+    turn, push = np.cross(rate, rate @ I_B + h), acceleration @ I_B
+    gyroscopic = law.gyroscopic
+    if gyroscopic is None:
+        gyroscopic = _fed_forward(law, I_B, series, turn)
+    pushed = gyroscopic if law.acceleration is None else law.acceleration
+    feed = gyroscopic * turn + pushed * push
+    fed = gyroscopic * cumulative_trapezoid(turn, at, axis=0, initial=0) + pushed * (rate - rate[0]) @ I_B
+    return Command(at, rate, acceleration, feed, fed, variance, source, gyroscopic, pushed)
+
+
+def _commanded(subject: Subject, grid: Grid, series, law: WheelController):
+    """Rates and their derivative (M, 3), the rates' variance and its derivative's (2, 3), and where they are from."""
+    tlm, at = subject.telemetry, grid.seconds
+    if tlm.has_axes("commanded_rate"):
+        channels = [tlm.channel(f"commanded_rate_{a}").usable for a in AXES]
+        rate = np.column_stack([np.interp(at, grid.of(c.tai_ns), c.values) for c in channels])
+        return rate, np.gradient(rate, at, axis=0), np.zeros((2, 3)), "commanded rate"
+    if all(n in tlm for n in _COMMANDED):
+        tai_ns, q = together(tlm, _COMMANDED)
+        middle, between = rates_between(grid.of(tai_ns), q)
+        smooth = [make_smoothing_spline(middle, between[:, j]) for j in range(3)]
+        inside = np.clip(at, middle[0], middle[-1])
+        rate = np.column_stack([f(inside) for f in smooth])
+        return rate, np.column_stack([f.derivative()(inside) for f in smooth]), np.zeros((2, 3)), "commanded attitude"
+    spacing = max(_SMOOTHED_S, _LOOP_TIMES / law.natural_frequency_rad_s)
+    most = max(1, round(float(at[-1]) / spacing))
+    block_s = max(_BLOCK_S, 2 / law.natural_frequency_rad_s)
+    measured = [next(s for s in series[j] if s.row == BODY_RATE) for j in range(3)]
+    fits = [_smoothed(s.seconds, ndimage.median_filter(s.values, 5), 0, most, block_s) for s in measured]
+    found = [np.column_stack([f.at(at, k) for f in fits]) for k in (0, 1)]
+    source, variance = "smoothed body rates", np.array([f.variance for f in fits]).T
+    if all(n in tlm for n in _QUATERNION):
+        found, variance = _from_attitude(subject, grid, series, found[0], most, block_s)
+        source = "smoothed attitude"
+    return found[0], found[1], variance, source
+
+
+def _from_attitude(subject: Subject, grid: Grid, series, rate: np.ndarray, most: int, block_s: float):
+    """[rates, their derivatives] of what the attitude and its error say is commanded, and the variance of each (2, 3).
+
+    ``rate``: (M, 3), from the body rates; the attitude's angles off what they make are smoothed."""
+    tai_ns, q = together(subject.telemetry, _QUATERNION)
+    s, at = grid.of(tai_ns), grid.seconds
+    inside = (s >= 0) & (s <= at[-1] + 1e-6)
+    s, commanded = s[inside], rotation(q[inside])
+    errors = {j: x for j in range(3) for x in series[j] if x.row == ATTITUDE_ERROR}
+    error = np.column_stack([np.interp(s, errors[j].seconds, errors[j].values) for j in range(3)])
+    commanded = commanded * Rotation.from_rotvec(error)
+    acceleration, fits = np.gradient(rate, at, axis=0), []
+    for _ in range(2):  # what is left of the first is of second order
+        made = Slerp(at, turned_by(at, rate))(np.clip(s, 0, at[-1]))
+        off = (made.inv() * (commanded[0] * made[0].inv()).inv() * commanded).as_rotvec()
+        fits = [_smoothed(s, off[:, j], 1, most, block_s) for j in range(3)]
+        angle, more, curve = (np.column_stack([f.at(at, k) for f in fits]) for k in range(3))
+        rate = rate + more - np.cross(angle, rate)
+        acceleration = acceleration + curve - np.cross(more, rate)
+    return [rate, acceleration], np.array([f.variance for f in fits]).T
+
+
+@dataclass(frozen=True)
+class _Smooth:
+    """A spline and the variance of the rate it stands for, and of that rate's derivative."""
+
+    spline: BSpline
+    variance: tuple[float, float]
+
+    def at(self, seconds: np.ndarray, derivative: int) -> np.ndarray:
+        return self.spline(seconds, derivative) if derivative <= self.spline.k else np.zeros(len(seconds))
+
+
+def _smoothed(seconds: np.ndarray, values: np.ndarray, order: int, most: int, block_s: float) -> _Smooth:
+    """The spline that means over blocks call for (BIC); ``order``: 0 for rates, 1 for angles; ``most``: pieces."""
+    block = (seconds / block_s).astype(int)
+    count = np.bincount(block)
+    full = count >= 0.5 * np.median(count)
+    t, y = (np.bincount(block, v)[full] / count[full] for v in (seconds, values))
+    end, n = float(seconds[-1]), len(t)
+    shapes = [(k, 1) for k in range(4)] + [(3, pieces) for pieces in range(2, most + 1)]
+    best = None
+    for k, pieces in shapes:
+        k, size = k + order, k + order + pieces
+        if size > n // 3 and best is not None:
+            break
+        knots = np.concatenate([[0.0] * k, np.linspace(0, end, pieces + 1), [end] * k])
+        spline = make_lsq_spline(t, y, knots, k)
+        square = float(np.mean((y - spline(t)) ** 2)) + 1e-300
+        score = n * np.log(square) + size * np.log(n)
+        if best is None or score < best[0]:
+            best = score, spline, square, size, pieces
+    _, spline, square, size, pieces = best
+    each, span = square * size / max(n - size, 1), end / pieces
+    # of a least-squares line, and of a parabola
+    slope, curve = 12 * each / span**2, 720 * each / span**4
+    return _Smooth(spline, (slope, curve) if order else (each, slope))
+
+
+def _fed_forward(law: WheelController, I_B: np.ndarray, series, turn: np.ndarray) -> bool:
+    """Whether the actuators' mean action is nearer to what the law does with w x H fed forward than without."""
+    beside = np.zeros(3)
+    for j, of_axis in series.items():
+        row = {s.row: s for s in of_axis}
+        h, e = row[MOMENTUM], row[ATTITUDE_ERROR]
+        line = np.polynomial.Polynomial.fit(h.seconds, h.values, 1).convert().coef
+        held = I_B[j, j] * law.kd_per_s * law.kp_per_s * float(np.mean(e.values))
+        beside[j] = -line[1] - held
+    mean = turn.mean(axis=0)
+    return bool(np.linalg.norm(beside - mean) < np.linalg.norm(beside))
