@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
-from ...dynamics.rigid_body import tensor_of
 from ...kit.doubts import Doubts, Kind, Severity
 from ...kit.errors import BadInput
 from ...kit.regression import memory
@@ -87,7 +86,7 @@ def _residual(record: SlewRecord):
     r = rotation(motion.q_NB)
     arc = np.zeros(len(times), int)
     arc[index] = m.arc
-    total = r.apply(held + motion.omega_B @ tensor_of(beta[layout.TENSOR]))
+    total = r.apply(held - record.tensor_columns(times, r.as_matrix(), motion.omega_B) @ beta[layout.TENSOR])
     return times, total - layout.momenta(beta)[arc], arc
 
 

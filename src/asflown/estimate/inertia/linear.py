@@ -192,6 +192,9 @@ def _wheel_rows(about: Reference, states: States, frame: str, seen: np.ndarray) 
     d, I_B = m.direction, about.tensor
     grown = grown_by(motion.time_s, R, frame)
     added = grown @ beta[layout.torque]
+    gravity = about.record.grown_by_gravity(motion.time_s, R)
+    if gravity is not None:
+        added = added + gravity @ beta[layout.TENSOR]
     w, alpha, Rk = motion.omega_B[k], motion.alpha_B[k], R[k]
     L = np.einsum("nji,nj->ni", Rk, layout.momenta(beta)[m.arc] + added[k])  # of everything, body axes
     predicted = L - w @ I_B
@@ -201,6 +204,8 @@ def _wheel_rows(about: Reference, states: States, frame: str, seen: np.ndarray) 
     Z = np.zeros((len(k), layout.size + 2))
     Z[:, layout.TENSOR] = -np.einsum("ni,nik->nk", d, momentum_regressor(w @ seen))
     inertial = np.einsum("nij,nj->ni", Rk, d)
+    if gravity is not None:
+        Z[:, layout.TENSOR] += np.einsum("ni,nik->nk", inertial, gravity[k])
     if states.wander is not None:
         H[:, states.wander] = inertial
     for arc in range(layout.arcs):

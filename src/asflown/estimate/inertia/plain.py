@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...dynamics.rigid_body import momentum_regressor
 from ...kit.rotations import rotation
 from .motion import Layout, first_motion
 
@@ -42,7 +41,8 @@ def _equations(record: SlewRecord, beta: np.ndarray | None, skew_s: float) -> tu
     motion = first_motion(shifted(record, beta), times)
     k = np.searchsorted(times, m.time_s + skew_s)
     columns = np.zeros((len(k), 6 + 3 * layout.arcs))
-    columns[:, :6] = -np.einsum("ni,nik->nk", m.direction, momentum_regressor(motion.omega_B[k]))
+    R = rotation(motion.q_NB).as_matrix()
+    columns[:, :6] = np.einsum("ni,nik->nk", m.direction, record.tensor_columns(times, R, motion.omega_B)[k])
     inertial = rotation(motion.q_NB[k]).apply(m.direction)
     for arc in range(layout.arcs):
         here = m.arc == arc

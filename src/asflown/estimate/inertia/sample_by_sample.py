@@ -34,6 +34,8 @@ class Rows:
     h_B: np.ndarray  # (N, 3)
     motion: Motion
     arc: np.ndarray  # (N,)
+    columns: np.ndarray  # (N, 3, 6), of h_B per unit of each element
+    gravity: np.ndarray | None  # (N, 3, 6), what the gravity gradient adds to the momentum, inertial axes
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,11 @@ def rows_of(record: SlewRecord) -> Rows:
     arc = np.zeros(len(times), int)
     arc[index] = m.arc
     times, h, arc = times[whole], h[whole], arc[whole]
-    return Rows(times, h, first_motion(record, times), arc)
+    motion = first_motion(record, times)
+    R = rotation(motion.q_NB).as_matrix()
+    return Rows(
+        times, h, motion, arc, record.tensor_columns(times, R, motion.omega_B), record.grown_by_gravity(times, R)
+    )  # fmt: skip
 
 
 def by_axis(rows: Rows, slews: list[Slew]) -> Solved:
@@ -77,12 +83,15 @@ def by_axis(rows: Rows, slews: list[Slew]) -> Solved:
     all its rows share."""
     column, variance = np.full((3, 3), np.nan), np.full((3, 3), np.nan)
     residual, used = np.full((len(rows.time_s), 3), np.nan), np.zeros(len(rows.time_s), bool)
+    pulled = None if rows.gravity is None else _plain_elements(rows)
     for k in range(3):
         square, pull, shared, spans = 0.0, np.zeros(3), 0.0, []
         for slew in (s for s in slews if s.about == "xyz"[k]):
             here, Q = _gained(rows, slew)
             if here is None:
                 continue
+            if pulled is not None:  # small beside the slew's own momentum: the tensor of all rows will do
+                Q = Q + _brought(rows, here) @ pulled
             w = rows.motion.omega_B[here, k]
             square += w @ w
             pull += w @ Q
@@ -126,6 +135,8 @@ def all_axes(rows: Rows, slews: list[Slew]) -> Solved:
         if here is None:
             continue
         S = momentum_regressor(rows.motion.omega_B[here])
+        if rows.gravity is not None:
+            S = S - _brought(rows, here)
         square += np.einsum("nik,nil->kl", S, S)
         pull += np.einsum("nik,ni->k", S, Q)
         total = S.sum(axis=0)  # the first momentum's error enters every row of the slew
@@ -156,7 +167,7 @@ def generalized(rows: Rows, levels: Levels, unit_kgm2: np.ndarray, frame: str) -
     arcs, index = np.unique(rows.arc, return_inverse=True)
     p = 6 + 3 * len(arcs)
     X = np.zeros((len(t), 3, p + 3))
-    X[:, :, :6] = -momentum_regressor(w)
+    X[:, :, :6] = rows.columns
     for k in range(len(t)):
         X[k, :, 6 + 3 * index[k] : 9 + 3 * index[k]] = R[k].T
     X[:, :, p:] = np.swapaxes(R, 1, 2) @ grown_by(t, R, frame)
@@ -194,10 +205,15 @@ def _row_covariance(rows: Rows, levels: Levels, unit_kgm2: np.ndarray, elements:
 
 def _plain_elements(rows: Rows) -> np.ndarray:
     """A rough tensor to start from: momentum free, ordinary least squares."""
-    S = momentum_regressor(rows.motion.omega_B)
     R = rotation(rows.motion.q_NB).as_matrix()
-    X = np.concatenate([-S, np.swapaxes(R, 1, 2)], axis=2).reshape(-1, 9)
+    X = np.concatenate([rows.columns, np.swapaxes(R, 1, 2)], axis=2).reshape(-1, 9)
     return np.linalg.lstsq(X, rows.h_B.ravel(), rcond=1e-8)[0][:6]
+
+
+def _brought(rows: Rows, here: np.ndarray) -> np.ndarray:
+    """Momentum that the gravity gradient has brought since the reading before a slew, per unit of each element, body axes. (n, 3, 6)"""
+    since = rows.gravity[here] - rows.gravity[here[0] - _BEFORE : here[0]].mean(axis=0)
+    return np.swapaxes(rotation(rows.motion.q_NB[here]).as_matrix(), 1, 2) @ since
 
 
 def _gained(rows: Rows, slew: Slew):
