@@ -53,4 +53,7 @@ def slews(name: str):
         made[f"body_rate_{a}"] = column(f"GYR_{a.upper()}", np.pi / 180)
         made[f"orbit_position_{a}"] = column(f"POS_{a.upper()}", 1e3)
         made[f"orbit_velocity_{a}"] = column(f"VEL_{a.upper()}", 1e3)
+    for a in AXES:
+        made[f"magnetic_field_{a}"] = column(f"MAG_{a.upper()}", 1e-9)
+        made[f"sun_direction_{a}"] = column(f"SUN_{a.upper()}")
     return telemetry_of(826_876_837 * NS, **made)

@@ -12,6 +12,7 @@ from ...dynamics.orbit import BODIES, Orbit
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
+from .surroundings import surroundings_of
 
 if TYPE_CHECKING:
     from ...telemetry.telemetry import Telemetry
@@ -92,7 +93,8 @@ def with_orbit(record: SlewRecord, telemetry: Telemetry, start_ns: int, I_B: np.
     gap = _gap(record, orbit)
     if gap > _GAP * 2 * np.pi * np.sqrt(orbit.nearest_m**3 / orbit.mu):
         return _without(record, *doubts, ORBIT_TOO_SHORT(why=f"{gap:.0f} s without one", left_out=left_out))
-    return replace(record, orbit=orbit, doubts=record.doubts + Doubts(doubts))
+    around = surroundings_of(telemetry, start_ns, orbit)
+    return replace(record, orbit=orbit, surroundings=around, doubts=record.doubts + Doubts(doubts))
 
 
 def _without(record: SlewRecord, *doubts: Doubt | None) -> SlewRecord:

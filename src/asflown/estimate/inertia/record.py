@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ...dynamics.orbit import Orbit
+    from .surroundings import Surroundings
 
 MOMENTUM_STEPS = Kind(
     "inertia.momentum-steps", Severity.SUSPECT,
@@ -94,7 +95,7 @@ class SlewRecord:
     """One record.  ``arcs``: spans [s] over which nothing but an external torque changes the momentum.
 
     ``wanders``: whether that torque varies so much that the total momentum is modelled as a random walk; ``slow``: whether a
-    slow coloured torque is part of the model; ``orbit``: where the gravity gradient comes from; ``steps``: at which instants
+    slow coloured torque is part of the model, and with it the levers of the ``surroundings``; ``orbit``: where the gravity gradient comes from; ``steps``: at which instants
     arcs were parted because the momentum steps."""
 
     zero_s: float  # the record's start, from the telemetry's epoch
@@ -110,6 +111,7 @@ class SlewRecord:
     wanders: bool = False
     slow: bool = False
     orbit: Orbit | None = None
+    surroundings: Surroundings | None = None
     steps: tuple[float, ...] = ()
     whole: SlewRecord | None = None  # before any step
 
@@ -143,6 +145,11 @@ class SlewRecord:
         parts = [(self.rates.time_s[m], self.rates.value_rad_s[m]) for j in range(3) for m in [self.rates.axis == j]]
         times = np.intersect1d(np.intersect1d(parts[0][0], parts[1][0]), parts[2][0])
         return times, np.stack([v[np.searchsorted(t, times)] for t, v in parts], axis=1)
+
+    @property
+    def levers(self) -> int:
+        """How many levers of the surroundings are fitted."""
+        return len(self.surroundings.names) if self.slow and self.surroundings is not None else 0
 
     def split_at(self, time_s: float) -> SlewRecord:
         """The same record with the arc around an instant parted there, where the momentum steps."""

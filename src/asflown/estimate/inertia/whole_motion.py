@@ -33,6 +33,8 @@ _BIAS_ALONE = 1e-5
 #: Sigma of a time offset, in wheels' cadences, where single kicks are all that informs: a wider prior would let the fit move
 #: a kick from one reading to the next.
 _SKEW_KICKED = 0.25
+#: Sigma of a lever of the surroundings, over the torque that is seen to act: wide, and finite where no motion tells it.
+_LEVER_SHARE = 10.0
 _SKEWS_TRIED = np.arange(-8.0, 8.01, 0.5)
 _MOST_ROUNDS = 20
 #: Sigmas the answer may still move by in the last round.
@@ -149,7 +151,10 @@ class _Task:
         first = replace(first, **{n: max(getattr(first, n), 2 * v) for n, v in floors(record).items()})
         if record.wanders:
             first = replace(first, kick=first.rate, wander=first.wheel * float(np.median(record.momentum.unit)))
-        return cls(record, frame, seen, *prior_of_all(Layout.of(record), prior, skew), first, known)
+        elif record.slow:
+            first = replace(first, slow=_slow_torque(record))
+        weight, centre = prior_of_all(Layout.of(record), prior, skew, _LEVER_SHARE * first.slow)
+        return cls(record, frame, seen, weight, centre, first, known)
 
     def start(self, prior: Prior | None) -> _State:
         beta, motion = _start(self.record)
@@ -186,12 +191,14 @@ class _Task:
         return weighted, levels
 
 
-def prior_of_all(layout: Layout, prior: Prior | None, skew_s: float = _SKEW_S) -> tuple[np.ndarray, np.ndarray]:
+def prior_of_all(layout: Layout, prior: Prior | None, skew_s: float = _SKEW_S, lever_Nm: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
     """Information (p, p) and centre (p,) for all constants, from that of the tensor and sigma of a time offset."""
     weight, centre = np.zeros((layout.size, layout.size)), np.zeros(layout.size)
     for k in (layout.skew_wheels, layout.skew_rates):
         if k is not None:
             weight[k, k] = 1 / skew_s**2
+    for k in range(layout.torque.stop, layout.pushes.stop):
+        weight[k, k] = 1 / lever_Nm**2
     if layout.bias is not None:
         weight[layout.bias, layout.bias] = np.eye(3) / (_BIAS if layout.skew_rates is not None else _BIAS_ALONE) ** 2
     if prior is not None:
@@ -212,7 +219,14 @@ def carried(loosened: np.ndarray, old: Motion, new: Motion) -> np.ndarray:
 def _near(a: Levels, b: Levels) -> bool:
     return all(
         abs(np.log(getattr(b, n) / getattr(a, n))) < 0.03 for n in ("wheel", "rate", "attitude", "coloured")
-    ) and (abs(b.wander - a.wander) <= 0.05 * a.wander)
+    ) and all(abs(getattr(b, n) - getattr(a, n)) <= 0.05 * getattr(a, n) for n in ("wander", "slow"))
+
+
+def _slow_torque(record: SlewRecord) -> float:
+    """About the size of an outside torque that would explain what plain least squares of momentum leaves over. [N m]"""
+    m = record.momentum
+    left = np.sqrt(plain_fit(record)[1] / len(m.time_s))
+    return max(6 * float(left) / float(np.ptp(m.time_s)), 1e-13)
 
 
 def _start(record: SlewRecord) -> tuple[np.ndarray, Motion]:
