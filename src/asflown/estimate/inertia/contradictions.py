@@ -16,7 +16,7 @@ from ...kit.rotations import rotation
 from ...kit.scatter import robust_sigma
 from ...telemetry.attitude import MISTAKEN_UNITS
 from .motion import Layout, first_motion
-from .plain import plain_fit
+from .plain import left_of_slow, plain_fit
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -42,7 +42,8 @@ WANDERS = Kind(
 
 
 def conserved(record: SlewRecord, slews: list[Slew], source: str | None) -> SlewRecord:
-    """The record with its arcs parted where the momentum plainly steps; it wanders where it is not conserved even then.
+    """The record with its arcs parted where the momentum plainly steps; it wanders where it is not conserved even then.  In orbit a
+    slow torque is tried first: there is always one.
 
     Raises BadInput, naming the likeliest mistake, where another reading of the data conserves it far better.  Tried: the
     quaternion in the other direction, rates in another unit where no attitude shows it, one wheel turning the other
@@ -60,6 +61,8 @@ def conserved(record: SlewRecord, slews: list[Slew], source: str | None) -> Slew
             remedy="Correct the column names and units, the craft's wheel axes or the quaternion's direction, or leave the span out "
             "(--start, --stop).",
         )
+    if record.orbit is not None and left_of_slow(record) <= limit:
+        return replace(record, slow=True)
     parted = record
     for _ in range(MOST_STEPS):
         at = _step_of_momentum(*_residual(parted))

@@ -163,6 +163,13 @@ def _pass(steps: Steps, layout: Layout, around: Around | None) -> tuple[Filtered
     return f, np.append(beta, [0.0, 0.0]), float(0.5 * off @ around.information @ off)
 
 
+def information_criterion(weighted: Weighted, levels: Levels, around: Around, parameters: int) -> float:
+    """Bayes's (BIC): twice the cost, with the steps' variances by their own prior, and ln M for each of the model's parameters."""
+    x = weighted.loosened[1:]
+    walk = _FREEDOM / 2 * float(np.sum(np.log(x) + 1 / x))
+    return 2 * (_cost(weighted, levels, around) + walk) + parameters * float(np.log(len(weighted.kept)))
+
+
 def _cost(weighted: Weighted, levels: Levels, around: Around | None) -> float:
     """Minus log likelihood."""
     f, whole, penalty = _pass(weighted.steps(levels), weighted.model.layout, around)

@@ -14,12 +14,30 @@ if TYPE_CHECKING:
     from .record import SlewRecord
 
 
+#: A slow torque changes over this time or longer [s]; degrees of the polynomial that stands for it.
+_SLOW_S, _MOST_DEGREES = 200.0, 12
+
+
 def plain_fit(record: SlewRecord, beta: np.ndarray | None = None, skew_s: float = 0.0) -> tuple[np.ndarray, float]:
     """Tensor and momenta by least squares of momentum alone, wheels ``skew_s`` later: beta, and the squares left over.
 
     ``beta``: constants to start from, of which the rates' time offset counts; zeros unless given."""
     beta, columns, value = _equations(record, beta, skew_s)
     return _solved(beta, columns, value, rounds=3)  # a few wild readings must not decide where the fit starts
+
+
+def left_of_slow(record: SlewRecord) -> float:
+    """Squares left over where the momentum may also change slowly: polynomials of time, one degree for every ``_SLOW_S``."""
+    beta, columns, value = _equations(record, None, 0.0)
+    m = record.momentum
+    times = np.unique(m.time_s)
+    span = times[-1] - times[0]
+    degree = int(np.clip(span / _SLOW_S, 2, _MOST_DEGREES))
+    powers = np.polynomial.legendre.legvander(2 * (m.time_s - times[0]) / span - 1, degree)[:, 1:]
+    motion = first_motion(record, times)
+    inertial = rotation(motion.q_NB[np.searchsorted(times, m.time_s)]).apply(m.direction)
+    slow = (inertial[:, :, None] * powers[:, None, :]).reshape(len(value), -1)
+    return _solved(np.zeros(columns.shape[1] + slow.shape[1]), np.column_stack([columns, slow]), value, rounds=3)[1]
 
 
 def fit_of_changes(record: SlewRecord, beta: np.ndarray, skew_s: float) -> tuple[np.ndarray, float]:

@@ -15,7 +15,17 @@ import numpy as np
 from ...kit.regressed import Disturbances, run, smooth
 from ...kit.rotations import rates_between
 from .levels import Levels, first_levels
-from .likelihood import Around, Weighted, corners_loosened, floors, likeliest, outliers_sorted, smoothed, solved
+from .likelihood import (
+    Around,
+    Weighted,
+    corners_loosened,
+    floors,
+    information_criterion,
+    likeliest,
+    outliers_sorted,
+    smoothed,
+    solved,
+)
 from .linear import linearized
 from .motion import Layout, Motion, Reference, first_motion, instants
 from .plain import fit_of_changes, plain_fit, shifted
@@ -56,6 +66,7 @@ class SlewFit:
     levels: Levels
     smoothed: Disturbances
     rounds: int
+    around: Around
     converged: bool = False
 
     @property
@@ -69,6 +80,12 @@ class SlewFit:
     @property
     def beta(self) -> np.ndarray:
         return self.weighted.model.about.beta + self.moved
+
+    @property
+    def criterion(self) -> float:
+        """BIC; less is better.  A step has its instant and three components, a slow torque its size, its time and its levers."""
+        slow = 2 + 3 * self.record.levers if self.record.slow else 0
+        return information_criterion(self.weighted, self.levels, self.around, 4 * len(self.record.steps) + slow)
 
     @property
     def motion(self) -> Motion:
@@ -176,7 +193,7 @@ class _Task:
         f = run(steps)
         delta, covariance, by_scale = solved(f, model.layout, around)
         s = smooth(steps, f, np.append(delta, [0.0, 0.0]))
-        return SlewFit(weighted, delta, covariance, by_scale, levels, s, number)
+        return SlewFit(weighted, delta, covariance, by_scale, levels, s, number, around)
 
     def tuned(self, weighted: Weighted, levels: Levels, around: Around | None, number: int) -> tuple[Weighted, Levels]:
         """Corners loosened, outliers out (not where kicks look like outliers, nor before the motion is right), levels fitted."""
