@@ -24,8 +24,8 @@ def told_and_truth(name: str) -> dict:
 def kestrel(folder, name: str = "slews"):
     """The craft from what an analyst is told of it."""
     told = told_and_truth(name)["told"]
-    I = np.array(told["inertia_cad_kgm2"])
-    elements = " ".join(f"{v}" for v in (I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]))
+    cad = np.array(told["inertia_cad_kgm2"])
+    elements = " ".join(f"{v}" for v in (cad[0, 0], cad[1, 1], cad[2, 2], cad[0, 1], cad[0, 2], cad[1, 2]))
     lines = [
         'name = "kestrel"', 'description = "a small craft in low orbit"', "[[mass_properties]]", 'date = "2026-01-01"',
         'piece = "cad"', 'basis = "predicted"', f'inertia = "{elements} kg m2"', 'source = "CAD"',
@@ -40,7 +40,11 @@ def kestrel(folder, name: str = "slews"):
 
 @cache
 def slews(name: str):
-    rows = list(csv.DictReader(io.StringIO(gzip.decompress(flight_data(f"leo/{name}.csv.gz").read_bytes()).decode()), delimiter=";"))
+    rows = list(
+        csv.DictReader(
+            io.StringIO(gzip.decompress(flight_data(f"leo/{name}.csv.gz").read_bytes()).decode()), delimiter=";"
+        )
+    )
     utc = np.array([np.datetime64(r["UTC"].rstrip("Z"), "ms") for r in rows])
     t = (utc - utc[0]) / np.timedelta64(1, "s")
 

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ..subject import Subject
-    from .prior import Prior
     from .excitation import Excitation
+    from .prior import Prior
     from .record import SlewRecord
     from .whole_motion import SlewFit
 
@@ -149,7 +149,11 @@ def _step_doubt(fit: SlewFit, unparted: SlewFit | None) -> Doubt | None:
     k = int(np.argmax(np.abs(moved) / fit.sigma[Layout.TENSOR]))
     values = ", ".join(f"{n} {v:.6g}" for n, v in zip(ELEMENTS, unparted.beta[Layout.TENSOR], strict=True))
     return WITHOUT_STEPS(
-        values=values, element=ELEMENTS[k], change=moved[k], sigmas=abs(moved[k]) / fit.sigma[k], steps=len(fit.record.steps)
+        values=values,
+        element=ELEMENTS[k],
+        change=moved[k],
+        sigmas=abs(moved[k]) / fit.sigma[k],
+        steps=len(fit.record.steps),
     )
 
 

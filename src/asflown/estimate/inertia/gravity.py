@@ -128,7 +128,8 @@ def _size(record: SlewRecord, I_B: np.ndarray | None):
     def words(orbit: Orbit) -> str:
         if I_B is None or record.relative or orbit.nearest_m < 1e3:
             rate = 1.5 * MU_EARTH / max(orbit.nearest_m, 1e3) ** 3
-            return f"up to {rate:.2g} N m for each kg m2 between the principal moments"
+            each = "for each kg m2 between the principal moments"
+            return f"up to {rate:.2g} N m, or {rate * span:.2g} N m s over the record, {each}"
         torque = float(gravity_gradient_bound(I_B, orbit.nearest_m, orbit.mu))
         return f"up to {torque:.2g} N m, or {torque * span:.2g} N m s over the record"
 

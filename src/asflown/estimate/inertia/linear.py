@@ -138,7 +138,9 @@ def _halves(part: slice) -> tuple[slice, slice]:
     return slice(part.start, part.start + 3), slice(part.start + 3, part.stop)
 
 
-def _slow_torque(dt: np.ndarray, n: int, brought: slice, torque: slice, forgets_s: float) -> tuple[np.ndarray, np.ndarray]:
+def _slow_torque(
+    dt: np.ndarray, n: int, brought: slice, torque: slice, forgets_s: float
+) -> tuple[np.ndarray, np.ndarray]:
     """What a first-order Gauss-Markov torque of unit variance keeps over each step (kinds,), and the covariance of what is new
     in it and in the momentum that it brings (kinds, n, n)."""
     x, s = dt / forgets_s, forgets_s

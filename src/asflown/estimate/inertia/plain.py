@@ -28,7 +28,7 @@ def plain_fit(record: SlewRecord, beta: np.ndarray | None = None, skew_s: float 
 
 def left_of_slow(record: SlewRecord) -> float:
     """Squares left over where the momentum may also change slowly: polynomials of time, one degree for every ``_SLOW_S``."""
-    beta, columns, value = _equations(record, None, 0.0)
+    _, columns, value = _equations(record, None, 0.0)
     m = record.momentum
     times = np.unique(m.time_s)
     span = times[-1] - times[0]

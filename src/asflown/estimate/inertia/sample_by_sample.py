@@ -36,6 +36,7 @@ class Rows:
     arc: np.ndarray  # (N,)
     columns: np.ndarray  # (N, 3, 6), of h_B per unit of each element
     gravity: np.ndarray | None  # (N, 3, 6), what the gravity gradient adds to the momentum, inertial axes
+    levers: np.ndarray  # (N, 3, 3 sources), what the levers of the surroundings add, inertial axes
 
 
 @dataclass(frozen=True)
@@ -71,9 +72,9 @@ def rows_of(record: SlewRecord) -> Rows:
     times, h, arc = times[whole], h[whole], arc[whole]
     motion = first_motion(record, times)
     R = rotation(motion.q_NB).as_matrix()
-    return Rows(
-        times, h, motion, arc, record.tensor_columns(times, R, motion.omega_B), record.grown_by_gravity(times, R)
-    )  # fmt: skip
+    levers = record.surroundings.grown(times, R) if record.levers else np.empty((len(times), 3, 0))
+    columns = record.tensor_columns(times, R, motion.omega_B)
+    return Rows(times, h, motion, arc, columns, record.grown_by_gravity(times, R), levers)
 
 
 def by_axis(rows: Rows, slews: list[Slew]) -> Solved:
@@ -158,23 +159,25 @@ def all_axes(rows: Rows, slews: list[Slew]) -> Solved:
 
 def generalized(rows: Rows, levels: Levels, unit_kgm2: np.ndarray, frame: str) -> Solved:
     """All rows of all arcs, each arc's momentum free (it is common to the arc's rows, and no one reading gives it), a
-    constant external torque, and every row's own noise: wheels, rates through the tensor, attitude through the momentum.
+    constant external torque, levers of the surroundings where a slow torque acts, and every row's own noise: wheels, rates through
+    the tensor, attitude through the momentum.
 
     ``unit_kgm2`` (3, 3): covariance of h for unit variance of a wheel reading.
     White noise is assumed; the covariance is scaled by what is left over."""
-    t, w = rows.time_s, rows.motion.omega_B
+    t = rows.time_s
     R = rotation(rows.motion.q_NB).as_matrix()
     arcs, index = np.unique(rows.arc, return_inverse=True)
     p = 6 + 3 * len(arcs)
-    X = np.zeros((len(t), 3, p + 3))
+    pushed = np.concatenate([grown_by(t, R, frame), rows.levers], axis=2)
+    X = np.zeros((len(t), 3, p + pushed.shape[2]))
     X[:, :, :6] = rows.columns
     for k in range(len(t)):
         X[k, :, 6 + 3 * index[k] : 9 + 3 * index[k]] = R[k].T
-    X[:, :, p:] = np.swapaxes(R, 1, 2) @ grown_by(t, R, frame)
+    X[:, :, p:] = np.swapaxes(R, 1, 2) @ pushed
     elements = _plain_elements(rows)
     for _ in range(4):
         W = np.linalg.inv(np.linalg.cholesky(_row_covariance(rows, levels, unit_kgm2, elements)))
-        A, y = (W @ X).reshape(-1, p + 3), np.einsum("nij,nj->ni", W, rows.h_B).ravel()
+        A, y = (W @ X).reshape(-1, X.shape[2]), np.einsum("nij,nj->ni", W, rows.h_B).ravel()
         size = np.sqrt(np.sum(A**2, axis=0))
         size[size == 0] = 1.0
         A /= size
@@ -182,13 +185,13 @@ def generalized(rows: Rows, levels: Levels, unit_kgm2: np.ndarray, frame: str) -
         inverse = np.linalg.pinv(normal, rcond=1e-13, hermitian=True)
         beta = (inverse @ (A.T @ y)) / size
         elements = beta[:6]
-    chi2 = float(np.sum((y - A @ (beta * size)) ** 2) / max(len(y) - p - 3, 1))
+    chi2 = float(np.sum((y - A @ (beta * size)) ** 2) / max(len(y) - X.shape[2], 1))
     covariance = chi2 * inverse / np.outer(size, size)
     information = np.linalg.pinv(covariance[:6, :6], rcond=1e-12, hermitian=True)
     residual = rows.h_B - X @ beta
     return Solved(
-        elements, covariance[:6, :6], information, information @ elements, residual, np.ones(len(t), bool), {}, beta[p:],
-        covariance[p:, p:],
+        elements, covariance[:6, :6], information, information @ elements, residual, np.ones(len(t), bool), {},
+        beta[p : p + 3], covariance[p : p + 3, p : p + 3],
     )  # fmt: skip
 
 

@@ -208,7 +208,9 @@ class _Task:
         return weighted, levels
 
 
-def prior_of_all(layout: Layout, prior: Prior | None, skew_s: float = _SKEW_S, lever_Nm: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
+def prior_of_all(
+    layout: Layout, prior: Prior | None, skew_s: float = _SKEW_S, lever_Nm: float = np.inf
+) -> tuple[np.ndarray, np.ndarray]:
     """Information (p, p) and centre (p,) for all constants, from that of the tensor and sigma of a time offset."""
     weight, centre = np.zeros((layout.size, layout.size)), np.zeros(layout.size)
     for k in (layout.skew_wheels, layout.skew_rates):
