@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...dynamics.rigid_body import tensor_of
+from ...dynamics.rigid_body import ELEMENTS, tensor_of
 from ...kit.doubts import Doubt, Kind, Severity
 from ...kit.rotations import rotation
 from .contradictions import MOST_STEPS
 from .levels import first_levels
 from .linear import WHEEL
+from .motion import Layout
 from .prior import possible, prior_for
 from .result import Answer, Evidence
 from .slews import find_slews
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 
     from ..subject import Subject
     from .excitation import Excitation
+    from .prior import Prior
     from .record import SlewRecord
     from .whole_motion import SlewFit
 
@@ -46,7 +49,18 @@ OUTLIERS = Kind(
 )  # fmt: skip
 NOT_CONVERGED = Kind(
     "inertia.not-converged", Severity.CAUTION,
-    "the fit did not converge in {rounds} rounds: its sigmas may be too small", "Take a shorter window.",
+    "the fit did not settle in {rounds} rounds: no random sigma is given", "Take a shorter window.",
+)  # fmt: skip
+SLOW_TORQUE = Kind(
+    "inertia.slow-torque", Severity.NOTE,
+    "an outside torque that changes slowly is part of the model: {torque_Nm:.2g} N m rms over {lasts_s:.0f} s, fitted, beside the levers of "
+    "what the telemetry shows of field, sunlight and air stream",
+)  # fmt: skip
+WITHOUT_STEPS = Kind(
+    "inertia.without-steps", Severity.CAUTION,
+    "with a slow torque in place of the {steps} steps of momentum the tensor would be {values}: {element} moves most, by {change:+.3g} "
+    "({sigmas:.1f} sigma)",
+    "Add the thrusters' on-times, so that the steps need not be found.",
 )  # fmt: skip
 UNEXPLAINED = Kind(
     "inertia.unexplained", Severity.SUSPECT,
@@ -66,30 +80,80 @@ def by_whole_motion(
     """Raises BadInput where the slews do not identify the tensor and nothing else is known of it."""
     prior, leaning = prior_for(subject, excited)
     fit_of = partial(fit_slews, frame=frame, prior=prior, seen=excited.seen, progress=progress)
-    fit = fit_of(record)
-    for _ in range(0 if record.wanders else MOST_STEPS):
-        at, square = momentum_step(fit, prior)
-        if square < _STEP_KEPT:
-            break
-        fit = fit_of(fit.record.split_at(at))
+    fit, unparted = _explained(fit_of(record), fit_of, prior)
     layout = fit.layout
     tensor, torque = layout.TENSOR, layout.torque
     elements, impossible = possible(fit.beta[tensor], np.linalg.inv(fit.covariance[tensor, tensor]))
     evidence = _evidence(fit)
     by = fit.by_scale[tensor]
+    settled = 1.0 if fit.converged else np.nan
     return Answer(
         method="consistent",
         elements=elements,
-        covariance=fit.covariance[:6, :6],
+        covariance=settled * fit.covariance[:6, :6],
         by_scale=np.stack([tensor_of(by[:, 0]), tensor_of(by[:, 1])]),
         excitation=excited,
         torque_Nm=fit.beta[torque],
-        torque_sigma_Nm=fit.sigma[torque],
+        torque_sigma_Nm=settled * fit.sigma[torque],
         frame=frame,
         slews=tuple(find_slews(evidence.time_s, evidence.omega_rad_s, fit.levels.rate)),
         evidence=evidence,
-        settings=_settings(fit),
-        doubts=[*fit.record.doubts, *leaning, *impossible, *_fit_doubts(fit)],
+        settings=_settings(fit) | _without_steps(fit, unparted),
+        doubts=[*fit.record.doubts, *leaning, *impossible, *_fit_doubts(fit), _step_doubt(fit, unparted)],
+    )
+
+
+def _explained(
+    fit: SlewFit, fit_of: Callable[[SlewRecord], SlewFit], prior: Prior | None
+) -> tuple[SlewFit, SlewFit | None]:
+    """The fit of the best explanation of momentum that is not conserved, and that of a slow torque alone where steps were found.
+
+    A step is let in where it is plain and where it explains more than a slow torque would, each by what it costs (BIC)."""
+    record, slow = fit.record, None
+    if record.wanders:
+        return fit, None
+    for turn in range(MOST_STEPS + 1):
+        at, square = momentum_step(fit, prior)
+        plain = square >= _STEP_KEPT and turn < MOST_STEPS
+        if slow is None and (plain or fit.record.steps) and not fit.record.slow:
+            slow = fit_of(replace(fit.record.whole or record, slow=True))
+            parted = fit_of(fit.record.split_at(at)) if plain else fit
+            fit = slow if slow.criterion < parted.criterion else parted
+        elif plain:
+            parted = fit_of(fit.record.split_at(at))
+            if fit.record.slow and parted.criterion >= fit.criterion:
+                break
+            slow = slow or fit
+            fit = parted
+        else:
+            break
+    return fit, slow if fit.record.steps else None
+
+
+def _without_steps(fit: SlewFit, unparted: SlewFit | None) -> dict:
+    """The tensor of a slow torque in place of the steps, and the size of that torque where it is in the model."""
+    slow = {}
+    if fit.record.slow:
+        slow = {"slow_torque_Nm": fit.levels.slow, "slow_torque_s": fit.levels.slow_s}
+    if unparted is None:
+        return slow
+    sigma = tensor_of(unparted.sigma[Layout.TENSOR]) if unparted.converged else None
+    told = {"inertia_kgm2": tensor_of(unparted.beta[Layout.TENSOR]), "inertia_sigma_random_kgm2": sigma}
+    return slow | {"without_steps": told, "bic_without_steps_above": unparted.criterion - fit.criterion}
+
+
+def _step_doubt(fit: SlewFit, unparted: SlewFit | None) -> Doubt | None:
+    if unparted is None:
+        return SLOW_TORQUE(torque_Nm=fit.levels.slow, lasts_s=fit.levels.slow_s) if fit.record.slow else None
+    moved = unparted.beta[Layout.TENSOR] - fit.beta[Layout.TENSOR]
+    k = int(np.argmax(np.abs(moved) / fit.sigma[Layout.TENSOR]))
+    values = ", ".join(f"{n} {v:.6g}" for n, v in zip(ELEMENTS, unparted.beta[Layout.TENSOR], strict=True))
+    return WITHOUT_STEPS(
+        values=values,
+        element=ELEMENTS[k],
+        change=moved[k],
+        sigmas=abs(moved[k]) / fit.sigma[k],
+        steps=len(fit.record.steps),
     )
 
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
-from ...dynamics.rigid_body import tensor_of
 from ...kit.doubts import Doubts, Kind, Severity
 from ...kit.errors import BadInput
 from ...kit.regression import memory
@@ -17,7 +16,7 @@ from ...kit.rotations import rotation
 from ...kit.scatter import robust_sigma
 from ...telemetry.attitude import MISTAKEN_UNITS
 from .motion import Layout, first_motion
-from .plain import plain_fit
+from .plain import left_of_slow, plain_fit
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -43,7 +42,8 @@ WANDERS = Kind(
 
 
 def conserved(record: SlewRecord, slews: list[Slew], source: str | None) -> SlewRecord:
-    """The record with its arcs parted where the momentum plainly steps; it wanders where it is not conserved even then.
+    """The record with its arcs parted where the momentum plainly steps; it wanders where it is not conserved even then.  In orbit a
+    slow torque is tried first: there is always one.
 
     Raises BadInput, naming the likeliest mistake, where another reading of the data conserves it far better.  Tried: the
     quaternion in the other direction, rates in another unit where no attitude shows it, one wheel turning the other
@@ -61,6 +61,8 @@ def conserved(record: SlewRecord, slews: list[Slew], source: str | None) -> Slew
             remedy="Correct the column names and units, the craft's wheel axes or the quaternion's direction, or leave the span out "
             "(--start, --stop).",
         )
+    if record.orbit is not None and left_of_slow(record) <= limit:
+        return replace(record, slow=True)
     parted = record
     for _ in range(MOST_STEPS):
         at = _step_of_momentum(*_residual(parted))
@@ -87,7 +89,7 @@ def _residual(record: SlewRecord):
     r = rotation(motion.q_NB)
     arc = np.zeros(len(times), int)
     arc[index] = m.arc
-    total = r.apply(held + motion.omega_B @ tensor_of(beta[layout.TENSOR]))
+    total = r.apply(held - record.tensor_columns(times, r.as_matrix(), motion.omega_B) @ beta[layout.TENSOR])
     return times, total - layout.momenta(beta)[arc], arc
 
 

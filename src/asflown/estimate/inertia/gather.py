@@ -17,6 +17,7 @@ from ...kit.scatter import difference_sigma
 from ...kit.timeline import NS
 from ...telemetry.attitude import rate_scale, together
 from ...telemetry.channels import AXES
+from .gravity import with_orbit
 from .record import AttitudeSamples, MomentumSamples, RateSamples, SlewRecord
 from .slews import find_slews
 
@@ -91,10 +92,11 @@ def slew_record(subject: Subject) -> SlewRecord:
         reader.doubt_of(firing),
     ]
     counts = {stem: _count(subject.telemetry, stem) for stem in ("wheel_rate", "body_rate", "quaternion")}
-    return SlewRecord(
+    made = SlewRecord(
         zero_s=reader.zero_s, momentum=momentum, rates=rates, attitude=attitude, arcs=tuple(arcs), wheels=held.names,
         axes=held.axes, relative=subject.relative, counts=counts, doubts=Doubts(found),
     )  # fmt: skip
+    return with_orbit(made, subject.telemetry, reader.start_ns, subject.inertia_kgm2)
 
 
 def _check_motion(tlm: Telemetry, rates: RateSamples, attitude: AttitudeSamples) -> None:

@@ -36,7 +36,8 @@ class Levels:
 
     ``jerk``: of the acceleration's walk, per root second [rad/s2/s^0.5];
     ``kick``: of the rate's, where wheels stick and tear loose [rad/s/s^0.5]; ``wander``: of the total momentum's,
-    where outside torques vary [N m s/s^0.5].  The last two are not modelled where they are zero."""
+    where outside torques vary [N m s/s^0.5]; ``slow``: of a slow outside torque that forgets itself over ``slow_s``.  These
+    three are not modelled where they are zero."""
 
     wheel: float  # rad/s of one wheel, or N m s
     rate: float
@@ -46,6 +47,8 @@ class Levels:
     jerk: float
     kick: float = 0.0
     wander: float = 0.0
+    slow: float = 0.0  # N m
+    slow_s: float = 300.0
 
 
 def _median(sigmas: list[float], otherwise: float) -> float:

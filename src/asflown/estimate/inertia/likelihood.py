@@ -26,8 +26,9 @@ _LOOSEST = 1e10
 #: A reading this many sigmas from what all others say of it is left out, and let in again below the second.
 _OUT, _IN = 6.0, 4.0
 #: Factors by which one search may move a level; ten for the others.
-_REACH = {"jerk": 100.0, "kick": 100.0, "wander": 100.0, "coloured_s": 3.0}
-_LONGEST_S = 300.0
+_REACH = {"jerk": 100.0, "kick": 100.0, "wander": 100.0, "slow": 100.0, "coloured_s": 3.0, "slow_s": 3.0}
+#: Time constants fitted, and the bounds of each. [s]
+_LASTS = {"coloured_s": (1.0, 300.0), "slow_s": (30.0, 3000.0)}
 #: Steps that the noise levels are fitted on, where there are more.
 _ENOUGH = 2000
 
@@ -54,8 +55,8 @@ class Weighted:
         """The fastest part, where the model is long: levels need no more."""
         model = self.model
         N = len(model.start) - 1
-        if N <= _ENOUGH:
-            return self
+        if N <= _ENOUGH or model.states.slow is not None:
+            return self  # what is slow shows in the whole record only
         energy = np.cumsum(np.sum(model.about.motion.omega_B**2, axis=1))
         first = int(np.argmax(energy[_ENOUGH:] - energy[:-_ENOUGH]))
         rows = slice(first, first + _ENOUGH)
@@ -97,23 +98,25 @@ def likeliest(weighted: Weighted, levels: Levels, around: Around | None) -> Leve
     """Levels of the largest likelihood, the constants at their best for each, or held where ``around`` is None."""
     part = weighted.excerpt()
     floor = floors(part.model.about.record)
-    floor |= {n: 1e-14 for n in ("kick", "wander") if getattr(levels, n) > 0}
+    floor |= {n: 1e-14 for n in ("kick", "wander", "slow") if getattr(levels, n) > 0}
+    if levels.slow > 0:
+        floor["slow_s"] = _LASTS["slow_s"][0]
     names = list(floor)
     first = np.array([max(getattr(levels, n), 1.001 * floor[n]) for n in names])
 
     def cost(logs):
         trial = replace(levels, **dict(zip(names, np.exp(logs), strict=True)))
         value, slope = _cost_and_slope(part, trial, around)
-        if "coloured_s" in names:
-            h = 0.02
-            other = replace(trial, coloured_s=trial.coloured_s * np.exp(h))
-            slope["coloured_s"] = (_cost(part, other, around) - value) / h
+        h = 0.02
+        for n in _LASTS.keys() & set(names):
+            other = replace(trial, **{n: getattr(trial, n) * np.exp(h)})
+            slope[n] = (_cost(part, other, around) - value) / h
         return value, np.array([slope[n] for n in names])
 
     reach = np.log([_REACH.get(n, 10.0) for n in names])  # of one call; a far step of the search would end in rounding
     low, high = np.maximum(np.log(first) - reach, np.log([floor[n] for n in names])), np.log(first) + reach
-    if "coloured_s" in names:
-        high[names.index("coloured_s")] = np.log(_LONGEST_S)
+    for n in _LASTS.keys() & set(names):
+        high[names.index(n)] = np.log(_LASTS[n][1])
     best = optimize.minimize(cost, np.log(first), jac=True, method="L-BFGS-B", bounds=list(zip(low, high, strict=True)),
                              options={"maxiter": 6, "ftol": 1e-7})  # fmt: skip
     return replace(levels, **dict(zip(names, np.exp(best.x).tolist(), strict=True)))
@@ -160,6 +163,13 @@ def _pass(steps: Steps, layout: Layout, around: Around | None) -> tuple[Filtered
     return f, np.append(beta, [0.0, 0.0]), float(0.5 * off @ around.information @ off)
 
 
+def information_criterion(weighted: Weighted, levels: Levels, around: Around, parameters: int) -> float:
+    """Bayes's (BIC): twice the cost, with the steps' variances by their own prior, and ln M for each of the model's parameters."""
+    x = weighted.loosened[1:]
+    walk = _FREEDOM / 2 * float(np.sum(np.log(x) + 1 / x))
+    return 2 * (_cost(weighted, levels, around) + walk) + parameters * float(np.log(len(weighted.kept)))
+
+
 def _cost(weighted: Weighted, levels: Levels, around: Around | None) -> float:
     """Minus log likelihood."""
     f, whole, penalty = _pass(weighted.steps(levels), weighted.model.layout, around)
@@ -182,4 +192,8 @@ def _cost_and_slope(weighted: Weighted, levels: Levels, around: Around | None) -
         slope["coloured"] = -2 * (s.by_drive[:, 3 * model.walks].sum() + first)
     if model.states.wander is not None:
         slope["wander"] = -2 * s.by_drive[:, -1].sum()
+    slow = model.states.slow
+    if slow is not None:
+        torque = slice(slow.start + 3, slow.stop)
+        slope["slow"] = -2 * (s.by_drive[:, -1].sum() + levels.slow**2 * np.trace(s.by_first[torque, torque]))
     return penalty - f.log_likelihood(whole), slope

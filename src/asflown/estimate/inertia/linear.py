@@ -1,7 +1,7 @@
 """The motion of a slewing craft, linearized about a reference, and what every sensor says of it.
 
 States are small departures from the reference, body axes: angle (3), rate (3), acceleration (3), and, where there is attitude
-telemetry, its coloured error (3); where external torques vary, momentum (3), inertial axes.  The reference is what the data
+telemetry, its coloured error (3); where external torques vary, momentum (3), or a slow torque and its momentum (6), inertial axes.  The reference is what the data
 say, so the model of the motion is only how smooth it is: the acceleration is a random walk whose step size differs from
 interval to interval (a ramp's corner is one large step).  Nothing is assumed of the controller.
 
@@ -43,17 +43,20 @@ class States:
 
     coloured: slice | None
     wander: slice | None
+    slow: slice | None  # momentum that a slow torque has brought, and that torque, inertial axes
     size: int
 
     @classmethod
     def of(cls, record: SlewRecord, noise: Levels) -> States:
         size = 9
-        coloured = wander = None
+        coloured = wander = slow = None
         if record.has_attitude:
             coloured, size = slice(size, size + 3), size + 3
         if noise.wander > 0:
             wander, size = slice(size, size + 3), size + 3
-        return cls(coloured, wander, size)
+        if noise.slow > 0:
+            slow, size = slice(size, size + 6), size + 6
+        return cls(coloured, wander, slow, size)
 
 
 @dataclass(frozen=True)
@@ -107,6 +110,15 @@ class Linearized:
         if self.states.wander is not None:
             driven.append(_noise(dt, n, self.states.wander, dt))
             scale.append(np.full(len(self.which), levels.wander**2))
+        if self.states.slow is not None:
+            brought, torque = _halves(self.states.slow)
+            keep, driven_by = _slow_torque(dt, n, brought, torque, levels.slow_s)
+            driven.append(driven_by)
+            scale.append(np.full(len(self.which), levels.slow**2))
+            A = A.copy()
+            A[:, torque, torque] = np.eye(3) * keep[self.which][:, None, None]
+            A[:, brought, torque] = np.eye(3) * (levels.slow_s * (1 - keep))[self.which][:, None, None]
+            first[torque, torque] = levels.slow**2 * np.eye(3)
         sigma = np.array([levels.wheel, levels.rate, levels.attitude])[self.kind] * self.unit
         R = np.where(kept, sigma**2, OUTLIER_VARIANCE * sigma**2)
         return Steps(
@@ -120,6 +132,27 @@ def _noise(dt: np.ndarray, n: int, part: slice, variance: np.ndarray) -> np.ndar
     Q = np.zeros((len(dt), n, n))
     Q[:, part, part] = np.eye(3) * variance[:, None, None]
     return Q
+
+
+def _halves(part: slice) -> tuple[slice, slice]:
+    return slice(part.start, part.start + 3), slice(part.start + 3, part.stop)
+
+
+def _slow_torque(
+    dt: np.ndarray, n: int, brought: slice, torque: slice, forgets_s: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """What a first-order Gauss-Markov torque of unit variance keeps over each step (kinds,), and the covariance of what is new
+    in it and in the momentum that it brings (kinds, n, n)."""
+    x, s = dt / forgets_s, forgets_s
+    lost = -np.expm1(-x)
+    # the closed form loses its digits in short steps
+    short = x**3 * (2 / 3 - x / 2 + 7 * x**2 / 30)
+    momentum = s**2 * np.where(x < 1e-2, short, 2 * x - 4 * lost + lost * (2 - lost))
+    Q, eye = np.zeros((len(dt), n, n)), np.eye(3)
+    Q[:, torque, torque] = eye * (lost * (2 - lost))[:, None, None]
+    Q[:, brought, torque] = Q[:, torque, brought] = eye * (s * lost**2)[:, None, None]
+    Q[:, brought, brought] = eye * momentum[:, None, None]
+    return 1 - lost, Q
 
 
 def _walk(dt: np.ndarray, n: int, axis: int, last: int) -> np.ndarray:
@@ -191,7 +224,12 @@ def _wheel_rows(about: Reference, states: States, frame: str, seen: np.ndarray) 
     R = rotation(motion.q_NB).as_matrix()
     d, I_B = m.direction, about.tensor
     grown = grown_by(motion.time_s, R, frame)
-    added = grown @ beta[layout.torque]
+    if layout.levers:
+        grown = np.concatenate([grown, about.record.surroundings.grown(motion.time_s, R)], axis=2)
+    added = grown @ beta[layout.pushes]
+    gravity = about.record.grown_by_gravity(motion.time_s, R)
+    if gravity is not None:
+        added = added + gravity @ beta[layout.TENSOR]
     w, alpha, Rk = motion.omega_B[k], motion.alpha_B[k], R[k]
     L = np.einsum("nji,nj->ni", Rk, layout.momenta(beta)[m.arc] + added[k])  # of everything, body axes
     predicted = L - w @ I_B
@@ -201,12 +239,16 @@ def _wheel_rows(about: Reference, states: States, frame: str, seen: np.ndarray) 
     Z = np.zeros((len(k), layout.size + 2))
     Z[:, layout.TENSOR] = -np.einsum("ni,nik->nk", d, momentum_regressor(w @ seen))
     inertial = np.einsum("nij,nj->ni", Rk, d)
+    if gravity is not None:
+        Z[:, layout.TENSOR] += np.einsum("ni,nik->nk", inertial, gravity[k])
     if states.wander is not None:
         H[:, states.wander] = inertial
+    if states.slow is not None:
+        H[:, _halves(states.slow)[0]] = inertial
     for arc in range(layout.arcs):
         here = m.arc == arc
         Z[here, layout.momentum(arc)] = inertial[here]
-    Z[:, layout.torque] = np.einsum("ni,nij->nj", inertial, grown[k])
+    Z[:, layout.pushes] = np.einsum("ni,nij->nj", inertial, grown[k])
     Z[:, layout.skew_wheels] = np.sum(d * (-np.cross(w, L) - alpha @ I_B), axis=1)
     Z[:, layout.wheel_scale] = -np.sum(d * predicted, axis=1)
     late = Z[:, layout.skew_wheels] * (beta[layout.skew_wheels] - shift)

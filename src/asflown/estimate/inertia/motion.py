@@ -34,6 +34,7 @@ class Layout:
     skew_rates: int | None
     bias: slice | None
     size: int
+    levers: int = 0
 
     TENSOR = slice(0, 6)
 
@@ -43,6 +44,11 @@ class Layout:
     @property
     def torque(self) -> slice:
         return slice(6 + 3 * self.arcs, 9 + 3 * self.arcs)
+
+    @property
+    def pushes(self) -> slice:
+        """The torque and the levers of the surroundings."""
+        return slice(6 + 3 * self.arcs, 9 + 3 * self.arcs + 3 * self.levers)
 
     def momenta(self, beta: np.ndarray) -> np.ndarray:
         """Total momentum of each arc, inertial axes. (arcs, 3)"""
@@ -67,14 +73,14 @@ class Layout:
 
     @classmethod
     def of(cls, record: SlewRecord) -> Layout:
-        at = 9 + 3 * len(record.arcs)
+        at = 9 + 3 * len(record.arcs) + 3 * record.levers
         skew_wheels, at = at, at + 1
         skew_rates = bias = None
         if record.has_rates and record.has_attitude:
             skew_rates, at = at, at + 1
         if record.has_rates:
             bias, at = slice(at, at + 3), at + 3
-        return cls(len(record.arcs), skew_wheels, skew_rates, bias, at)
+        return cls(len(record.arcs), skew_wheels, skew_rates, bias, at, record.levers)
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...dynamics.rigid_body import momentum_regressor
 from ...kit.rotations import rotation
 from .motion import Layout, first_motion
 
 if TYPE_CHECKING:
     from .record import SlewRecord
+
+
+#: A slow torque changes over this time or longer [s]; degrees of the polynomial that stands for it.
+_SLOW_S, _MOST_DEGREES = 200.0, 12
 
 
 def plain_fit(record: SlewRecord, beta: np.ndarray | None = None, skew_s: float = 0.0) -> tuple[np.ndarray, float]:
@@ -21,6 +24,20 @@ def plain_fit(record: SlewRecord, beta: np.ndarray | None = None, skew_s: float 
     ``beta``: constants to start from, of which the rates' time offset counts; zeros unless given."""
     beta, columns, value = _equations(record, beta, skew_s)
     return _solved(beta, columns, value, rounds=3)  # a few wild readings must not decide where the fit starts
+
+
+def left_of_slow(record: SlewRecord) -> float:
+    """Squares left over where the momentum may also change slowly: polynomials of time, one degree for every ``_SLOW_S``."""
+    _, columns, value = _equations(record, None, 0.0)
+    m = record.momentum
+    times = np.unique(m.time_s)
+    span = times[-1] - times[0]
+    degree = int(np.clip(span / _SLOW_S, 2, _MOST_DEGREES))
+    powers = np.polynomial.legendre.legvander(2 * (m.time_s - times[0]) / span - 1, degree)[:, 1:]
+    motion = first_motion(record, times)
+    inertial = rotation(motion.q_NB[np.searchsorted(times, m.time_s)]).apply(m.direction)
+    slow = (inertial[:, :, None] * powers[:, None, :]).reshape(len(value), -1)
+    return _solved(np.zeros(columns.shape[1] + slow.shape[1]), np.column_stack([columns, slow]), value, rounds=3)[1]
 
 
 def fit_of_changes(record: SlewRecord, beta: np.ndarray, skew_s: float) -> tuple[np.ndarray, float]:
@@ -42,7 +59,8 @@ def _equations(record: SlewRecord, beta: np.ndarray | None, skew_s: float) -> tu
     motion = first_motion(shifted(record, beta), times)
     k = np.searchsorted(times, m.time_s + skew_s)
     columns = np.zeros((len(k), 6 + 3 * layout.arcs))
-    columns[:, :6] = -np.einsum("ni,nik->nk", m.direction, momentum_regressor(motion.omega_B[k]))
+    R = rotation(motion.q_NB).as_matrix()
+    columns[:, :6] = np.einsum("ni,nik->nk", m.direction, record.tensor_columns(times, R, motion.omega_B)[k])
     inertial = rotation(motion.q_NB[k]).apply(m.direction)
     for arc in range(layout.arcs):
         here = m.arc == arc

@@ -6,11 +6,17 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
+from ...dynamics.environment import gravity_gradient_regressor
+from ...dynamics.rigid_body import momentum_regressor
 from ...kit.doubts import Doubts, Kind, Severity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from ...dynamics.orbit import Orbit
+    from .surroundings import Surroundings
 
 MOMENTUM_STEPS = Kind(
     "inertia.momentum-steps", Severity.SUSPECT,
@@ -88,7 +94,9 @@ class AttitudeSamples:
 class SlewRecord:
     """One record.  ``arcs``: spans [s] over which nothing but an external torque changes the momentum.
 
-    ``wanders``: whether that torque varies so much that the total momentum is modelled as a random walk."""
+    ``wanders``: whether that torque varies so much that the total momentum is modelled as a random walk; ``slow``: whether a
+    slow coloured torque is part of the model, and with it the levers of the ``surroundings``; ``orbit``: where the gravity gradient comes from; ``steps``: at which instants
+    arcs were parted because the momentum steps."""
 
     zero_s: float  # the record's start, from the telemetry's epoch
     momentum: MomentumSamples
@@ -101,6 +109,11 @@ class SlewRecord:
     counts: dict[str, float]  # one count of each kind of channel, 0 where not known
     doubts: Doubts
     wanders: bool = False
+    slow: bool = False
+    orbit: Orbit | None = None
+    surroundings: Surroundings | None = None
+    steps: tuple[float, ...] = ()
+    whole: SlewRecord | None = None  # before any step
 
     @property
     def has_attitude(self) -> bool:
@@ -110,11 +123,33 @@ class SlewRecord:
     def has_rates(self) -> bool:
         return len(self.rates.time_s) > 0
 
+    def grown_by_gravity(self, time_s: np.ndarray, R: np.ndarray) -> np.ndarray | None:
+        """What the gravity gradient adds to the momentum since the first instant, per unit of each element of the tensor,
+        inertial axes (N, 3, 6); None where there is no orbit, or no attitude to say how it lies in the body.
+
+        R (N, 3, 3): body to inertial."""
+        if self.orbit is None or not self.has_attitude:
+            return None
+        r_B = np.einsum("nji,nj->ni", R, self.orbit.at(time_s))
+        return cumulative_trapezoid(R @ gravity_gradient_regressor(r_B, self.orbit.mu), time_s, axis=0, initial=0)
+
+    def tensor_columns(self, time_s: np.ndarray, R: np.ndarray, omega_B: np.ndarray) -> np.ndarray:
+        """Momentum of the wheels per unit of each element of the tensor, body axes: what the body turns with less, and what the
+        gravity gradient has brought. (N, 3, 6)"""
+        columns = -momentum_regressor(omega_B)
+        grown = self.grown_by_gravity(time_s, R)
+        return columns if grown is None else columns + np.swapaxes(R, 1, 2) @ grown
+
     def common_rates(self) -> tuple[np.ndarray, np.ndarray]:
         """Instants at which all three rates are known (N,), and the rates (N, 3)."""
         parts = [(self.rates.time_s[m], self.rates.value_rad_s[m]) for j in range(3) for m in [self.rates.axis == j]]
         times = np.intersect1d(np.intersect1d(parts[0][0], parts[1][0]), parts[2][0])
         return times, np.stack([v[np.searchsorted(t, times)] for t, v in parts], axis=1)
+
+    @property
+    def levers(self) -> int:
+        """How many levers of the surroundings are fitted."""
+        return len(self.surroundings.names) if self.slow and self.surroundings is not None else 0
 
     def split_at(self, time_s: float) -> SlewRecord:
         """The same record with the arc around an instant parted there, where the momentum steps."""
@@ -122,4 +157,7 @@ class SlewRecord:
         for a, b in self.arcs:
             arcs += [(a, time_s), (time_s, b)] if a < time_s < b else [(a, b)]
         doubts = Doubts([*self.doubts, MOMENTUM_STEPS(at_s=self.zero_s + time_s)])
-        return replace(self, arcs=tuple(arcs), momentum=self.momentum.sorted_into(arcs), doubts=doubts)
+        return replace(
+            self, arcs=tuple(arcs), momentum=self.momentum.sorted_into(arcs), doubts=doubts, steps=(*self.steps, time_s),
+            whole=self.whole or self,
+        )  # fmt: skip

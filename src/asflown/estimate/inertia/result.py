@@ -42,7 +42,7 @@ class InertiaRecord(TypedDict):
     method: Annotated[str, Doc("consistent, gls, all, axis, or momentum balance")]
     inertia_kgm2: Matrix | None
     inertia_sigma_kgm2: Annotated[Matrix | None, Doc("total: random and systematic")]
-    inertia_sigma_random_kgm2: Matrix | None
+    inertia_sigma_random_kgm2: Annotated[Matrix | None, Doc("null where the fit has not settled, as the total is")]
     inertia_sigma_systematic_kgm2: Annotated[
         Matrix | None, Doc("scale errors of the wheels' spin inertia and of the rates")
     ]
@@ -59,11 +59,11 @@ class InertiaRecord(TypedDict):
     comparison: Annotated[ComparisonRecord | None, Doc("with the predicted tensor")]
     settings: dict
     inertia_per_spin_inertia: NotRequired[Matrix]
-    inertia_sigma_per_spin_inertia: NotRequired[Matrix]
-    inertia_sigma_random_per_spin_inertia: NotRequired[Matrix]
+    inertia_sigma_per_spin_inertia: NotRequired[Matrix | None]
+    inertia_sigma_random_per_spin_inertia: NotRequired[Matrix | None]
     inertia_sigma_systematic_per_spin_inertia: NotRequired[Matrix]
     external_torque_per_spin_inertia_rad_s2: NotRequired[Vector]
-    external_torque_sigma_per_spin_inertia_rad_s2: NotRequired[Vector]
+    external_torque_sigma_per_spin_inertia_rad_s2: NotRequired[Vector | None]
     residual_rms_per_spin_inertia_rad_s: NotRequired[Number]
 
 
@@ -98,7 +98,7 @@ class Answer:
     slews: tuple[Slew, ...] = ()
     products: dict[str, tuple[float, float]] = field(default_factory=dict)
     settings: dict = field(default_factory=dict)
-    doubts: list[Doubt]
+    doubts: list[Doubt | None]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -141,6 +141,11 @@ class InertiaResult(Estimate):
         return np.hypot(self.inertia_sigma_random_kgm2, self.inertia_sigma_systematic_kgm2)
 
     @property
+    def settled(self) -> bool:
+        """Whether the fit settled; where it did not, random and total sigmas are NaN here and null in the record."""
+        return self.settings.get("converged") is not False
+
+    @property
     def residual_rms_Nms(self) -> float:
         """Of all components."""
         return float(np.sqrt(np.nanmean(self.evidence.residual_Nms[self.evidence.used] ** 2)))
@@ -155,6 +160,9 @@ class InertiaResult(Estimate):
             "external_torque_sigma_Nm": self.external_torque_sigma_Nm,
             "residual_rms_Nms": self.residual_rms_Nms,
         }
+        if not self.settled:
+            of_noise = ("inertia_sigma_kgm2", "inertia_sigma_random_kgm2", "external_torque_sigma_Nm")
+            measured |= dict.fromkeys(of_noise)
         record = {
             "craft": self.craft,
             "epoch": self.epoch,
@@ -212,7 +220,7 @@ class InertiaResult(Estimate):
         if np.isfinite(torque).all():
             factor, unit = 1.0, "rad/s^2 per unit spin inertia"
             if not self.relative:
-                factor, unit = scaled_unit(float(max(np.abs(torque).max(), sigma.max())), "N m")
+                factor, unit = scaled_unit(float(np.nanmax([*np.abs(torque), *sigma])), "N m")
             each = zip(AXES, factor * torque, factor * sigma, strict=True)
             remarks.append(
                 f"external torque: {', '.join(f'{a} {plus_minus(t, s)}' for a, t, s in each)} {unit}, {self.frame} axes"

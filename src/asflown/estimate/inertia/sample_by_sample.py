@@ -34,6 +34,9 @@ class Rows:
     h_B: np.ndarray  # (N, 3)
     motion: Motion
     arc: np.ndarray  # (N,)
+    columns: np.ndarray  # (N, 3, 6), of h_B per unit of each element
+    gravity: np.ndarray | None  # (N, 3, 6), what the gravity gradient adds to the momentum, inertial axes
+    levers: np.ndarray  # (N, 3, 3 sources), what the levers of the surroundings add, inertial axes
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,11 @@ def rows_of(record: SlewRecord) -> Rows:
     arc = np.zeros(len(times), int)
     arc[index] = m.arc
     times, h, arc = times[whole], h[whole], arc[whole]
-    return Rows(times, h, first_motion(record, times), arc)
+    motion = first_motion(record, times)
+    R = rotation(motion.q_NB).as_matrix()
+    levers = record.surroundings.grown(times, R) if record.levers else np.empty((len(times), 3, 0))
+    columns = record.tensor_columns(times, R, motion.omega_B)
+    return Rows(times, h, motion, arc, columns, record.grown_by_gravity(times, R), levers)
 
 
 def by_axis(rows: Rows, slews: list[Slew]) -> Solved:
@@ -77,12 +84,15 @@ def by_axis(rows: Rows, slews: list[Slew]) -> Solved:
     all its rows share."""
     column, variance = np.full((3, 3), np.nan), np.full((3, 3), np.nan)
     residual, used = np.full((len(rows.time_s), 3), np.nan), np.zeros(len(rows.time_s), bool)
+    pulled = None if rows.gravity is None else _plain_elements(rows)
     for k in range(3):
         square, pull, shared, spans = 0.0, np.zeros(3), 0.0, []
         for slew in (s for s in slews if s.about == "xyz"[k]):
             here, Q = _gained(rows, slew)
             if here is None:
                 continue
+            if pulled is not None:  # small beside the slew's own momentum: the tensor of all rows will do
+                Q = Q + _brought(rows, here) @ pulled
             w = rows.motion.omega_B[here, k]
             square += w @ w
             pull += w @ Q
@@ -126,6 +136,8 @@ def all_axes(rows: Rows, slews: list[Slew]) -> Solved:
         if here is None:
             continue
         S = momentum_regressor(rows.motion.omega_B[here])
+        if rows.gravity is not None:
+            S = S - _brought(rows, here)
         square += np.einsum("nik,nil->kl", S, S)
         pull += np.einsum("nik,ni->k", S, Q)
         total = S.sum(axis=0)  # the first momentum's error enters every row of the slew
@@ -147,23 +159,25 @@ def all_axes(rows: Rows, slews: list[Slew]) -> Solved:
 
 def generalized(rows: Rows, levels: Levels, unit_kgm2: np.ndarray, frame: str) -> Solved:
     """All rows of all arcs, each arc's momentum free (it is common to the arc's rows, and no one reading gives it), a
-    constant external torque, and every row's own noise: wheels, rates through the tensor, attitude through the momentum.
+    constant external torque, levers of the surroundings where a slow torque acts, and every row's own noise: wheels, rates through
+    the tensor, attitude through the momentum.
 
     ``unit_kgm2`` (3, 3): covariance of h for unit variance of a wheel reading.
     White noise is assumed; the covariance is scaled by what is left over."""
-    t, w = rows.time_s, rows.motion.omega_B
+    t = rows.time_s
     R = rotation(rows.motion.q_NB).as_matrix()
     arcs, index = np.unique(rows.arc, return_inverse=True)
     p = 6 + 3 * len(arcs)
-    X = np.zeros((len(t), 3, p + 3))
-    X[:, :, :6] = -momentum_regressor(w)
+    pushed = np.concatenate([grown_by(t, R, frame), rows.levers], axis=2)
+    X = np.zeros((len(t), 3, p + pushed.shape[2]))
+    X[:, :, :6] = rows.columns
     for k in range(len(t)):
         X[k, :, 6 + 3 * index[k] : 9 + 3 * index[k]] = R[k].T
-    X[:, :, p:] = np.swapaxes(R, 1, 2) @ grown_by(t, R, frame)
+    X[:, :, p:] = np.swapaxes(R, 1, 2) @ pushed
     elements = _plain_elements(rows)
     for _ in range(4):
         W = np.linalg.inv(np.linalg.cholesky(_row_covariance(rows, levels, unit_kgm2, elements)))
-        A, y = (W @ X).reshape(-1, p + 3), np.einsum("nij,nj->ni", W, rows.h_B).ravel()
+        A, y = (W @ X).reshape(-1, X.shape[2]), np.einsum("nij,nj->ni", W, rows.h_B).ravel()
         size = np.sqrt(np.sum(A**2, axis=0))
         size[size == 0] = 1.0
         A /= size
@@ -171,13 +185,13 @@ def generalized(rows: Rows, levels: Levels, unit_kgm2: np.ndarray, frame: str) -
         inverse = np.linalg.pinv(normal, rcond=1e-13, hermitian=True)
         beta = (inverse @ (A.T @ y)) / size
         elements = beta[:6]
-    chi2 = float(np.sum((y - A @ (beta * size)) ** 2) / max(len(y) - p - 3, 1))
+    chi2 = float(np.sum((y - A @ (beta * size)) ** 2) / max(len(y) - X.shape[2], 1))
     covariance = chi2 * inverse / np.outer(size, size)
     information = np.linalg.pinv(covariance[:6, :6], rcond=1e-12, hermitian=True)
     residual = rows.h_B - X @ beta
     return Solved(
-        elements, covariance[:6, :6], information, information @ elements, residual, np.ones(len(t), bool), {}, beta[p:],
-        covariance[p:, p:],
+        elements, covariance[:6, :6], information, information @ elements, residual, np.ones(len(t), bool), {},
+        beta[p : p + 3], covariance[p : p + 3, p : p + 3],
     )  # fmt: skip
 
 
@@ -194,10 +208,15 @@ def _row_covariance(rows: Rows, levels: Levels, unit_kgm2: np.ndarray, elements:
 
 def _plain_elements(rows: Rows) -> np.ndarray:
     """A rough tensor to start from: momentum free, ordinary least squares."""
-    S = momentum_regressor(rows.motion.omega_B)
     R = rotation(rows.motion.q_NB).as_matrix()
-    X = np.concatenate([-S, np.swapaxes(R, 1, 2)], axis=2).reshape(-1, 9)
+    X = np.concatenate([rows.columns, np.swapaxes(R, 1, 2)], axis=2).reshape(-1, 9)
     return np.linalg.lstsq(X, rows.h_B.ravel(), rcond=1e-8)[0][:6]
+
+
+def _brought(rows: Rows, here: np.ndarray) -> np.ndarray:
+    """Momentum that the gravity gradient has brought since the reading before a slew, per unit of each element, body axes. (n, 3, 6)"""
+    since = rows.gravity[here] - rows.gravity[here[0] - _BEFORE : here[0]].mean(axis=0)
+    return np.swapaxes(rotation(rows.motion.q_NB[here]).as_matrix(), 1, 2) @ since
 
 
 def _gained(rows: Rows, slew: Slew):

@@ -27,8 +27,10 @@ def momentum_step(fit: SlewFit, prior: Prior | None = None) -> tuple[float, floa
     As if a step were let in at each of many instants in turn, motion and levels held: all in one filter pass, then again
     between the neighbours of the best, down to the wheels' cadence.  Residuals would not show it: rates and coloured
     attitude error give way first."""
-    information, centre = prior_of_all(fit.layout, prior)
-    around = Around(information, centre - fit.weighted.model.about.beta)
+    around = fit.around
+    if not fit.record.slow:
+        information, centre = prior_of_all(fit.layout, prior)
+        around = Around(information, centre - fit.weighted.model.about.beta)
     momentum, cadence = fit.record.momentum, cadence_s(fit.record)
     best = 0.0, 0.0
     for arc, (_, stop) in enumerate(fit.record.arcs):

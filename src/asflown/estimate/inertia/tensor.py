@@ -56,6 +56,11 @@ NOT_IDENTIFIED = Kind(
     "inertia.not-identified", Severity.CAUTION, "no slew identifies {elements}: they are null",
     "Add slews about the other body axes, or use --method consistent.",
 )  # fmt: skip
+SLOW_BY_SAMPLES = Kind(
+    "inertia.slow-by-samples", Severity.SUSPECT,
+    "a slow outside torque acts, and method {method} {lacks}: its sigma is too small",
+    "Use --method consistent.",
+)  # fmt: skip
 
 
 @recorded
@@ -161,6 +166,10 @@ def _by_samples(subject: Subject, record: SlewRecord, method: str, frame: str) -
         solved = generalized(rows, levels, record.momentum.unit_covariance(), frame)
     else:
         solved = by_axis(rows, slews) if method == "axis" else all_axes(rows, slews)
+    slow = None
+    if record.slow:
+        lacks = "has its levers only, and white noise" if method == "gls" else "does not know of it"
+        slow = SLOW_BY_SAMPLES(method=method, lacks=lacks)
     omega = rows.motion.omega_B[solved.used]
     excited = excitation(omega if len(omega) else rows.motion.omega_B)
     if method == "axis":
@@ -181,7 +190,7 @@ def _by_samples(subject: Subject, record: SlewRecord, method: str, frame: str) -
         slews=tuple(replace(s, start_s=record.zero_s + s.start_s, stop_s=record.zero_s + s.stop_s) for s in slews),
         evidence=_evidence(record, rows, solved),
         products=solved.products,
-        doubts=[*record.doubts, *doubts],
+        doubts=[*record.doubts, *doubts, slow],
     )
 
 
@@ -242,7 +251,7 @@ def _result(subject: Subject, answer: Answer, wheel_scale: float, rate_scale: fl
     if not craft.mass_properties or not np.isfinite(result.inertia_kgm2).all():
         return result
     comparison = compare_inertia(
-        result.inertia_kgm2, predicted_inertia(craft, subject.craft.tai_ns), sigma=result.inertia_sigma_kgm2,
-        relative=subject.relative,
+        result.inertia_kgm2, predicted_inertia(craft, subject.craft.tai_ns),
+        sigma=result.inertia_sigma_kgm2 if result.settled else None, relative=subject.relative,
     )  # fmt: skip
     return replace(result, comparison=comparison, doubts=result.doubts + comparison.doubts)

@@ -15,7 +15,17 @@ import numpy as np
 from ...kit.regressed import Disturbances, run, smooth
 from ...kit.rotations import rates_between
 from .levels import Levels, first_levels
-from .likelihood import Around, Weighted, corners_loosened, floors, likeliest, outliers_sorted, smoothed, solved
+from .likelihood import (
+    Around,
+    Weighted,
+    corners_loosened,
+    floors,
+    information_criterion,
+    likeliest,
+    outliers_sorted,
+    smoothed,
+    solved,
+)
 from .linear import linearized
 from .motion import Layout, Motion, Reference, first_motion, instants
 from .plain import fit_of_changes, plain_fit, shifted
@@ -33,6 +43,8 @@ _BIAS_ALONE = 1e-5
 #: Sigma of a time offset, in wheels' cadences, where single kicks are all that informs: a wider prior would let the fit move
 #: a kick from one reading to the next.
 _SKEW_KICKED = 0.25
+#: Sigma of a lever of the surroundings, over the torque that is seen to act: wide, and finite where no motion tells it.
+_LEVER_SHARE = 10.0
 _SKEWS_TRIED = np.arange(-8.0, 8.01, 0.5)
 _MOST_ROUNDS = 20
 #: Sigmas the answer may still move by in the last round.
@@ -54,6 +66,7 @@ class SlewFit:
     levels: Levels
     smoothed: Disturbances
     rounds: int
+    around: Around
     converged: bool = False
 
     @property
@@ -67,6 +80,12 @@ class SlewFit:
     @property
     def beta(self) -> np.ndarray:
         return self.weighted.model.about.beta + self.moved
+
+    @property
+    def criterion(self) -> float:
+        """BIC; less is better.  A step has its instant and three components, a slow torque its size, its time and its levers."""
+        slow = 2 + 3 * self.record.levers if self.record.slow else 0
+        return information_criterion(self.weighted, self.levels, self.around, 4 * len(self.record.steps) + slow)
 
     @property
     def motion(self) -> Motion:
@@ -149,7 +168,10 @@ class _Task:
         first = replace(first, **{n: max(getattr(first, n), 2 * v) for n, v in floors(record).items()})
         if record.wanders:
             first = replace(first, kick=first.rate, wander=first.wheel * float(np.median(record.momentum.unit)))
-        return cls(record, frame, seen, *prior_of_all(Layout.of(record), prior, skew), first, known)
+        elif record.slow:
+            first = replace(first, slow=_slow_torque(record))
+        weight, centre = prior_of_all(Layout.of(record), prior, skew, _LEVER_SHARE * first.slow)
+        return cls(record, frame, seen, weight, centre, first, known)
 
     def start(self, prior: Prior | None) -> _State:
         beta, motion = _start(self.record)
@@ -171,7 +193,7 @@ class _Task:
         f = run(steps)
         delta, covariance, by_scale = solved(f, model.layout, around)
         s = smooth(steps, f, np.append(delta, [0.0, 0.0]))
-        return SlewFit(weighted, delta, covariance, by_scale, levels, s, number)
+        return SlewFit(weighted, delta, covariance, by_scale, levels, s, number, around)
 
     def tuned(self, weighted: Weighted, levels: Levels, around: Around | None, number: int) -> tuple[Weighted, Levels]:
         """Corners loosened, outliers out (not where kicks look like outliers, nor before the motion is right), levels fitted."""
@@ -186,12 +208,16 @@ class _Task:
         return weighted, levels
 
 
-def prior_of_all(layout: Layout, prior: Prior | None, skew_s: float = _SKEW_S) -> tuple[np.ndarray, np.ndarray]:
+def prior_of_all(
+    layout: Layout, prior: Prior | None, skew_s: float = _SKEW_S, lever_Nm: float = np.inf
+) -> tuple[np.ndarray, np.ndarray]:
     """Information (p, p) and centre (p,) for all constants, from that of the tensor and sigma of a time offset."""
     weight, centre = np.zeros((layout.size, layout.size)), np.zeros(layout.size)
     for k in (layout.skew_wheels, layout.skew_rates):
         if k is not None:
             weight[k, k] = 1 / skew_s**2
+    for k in range(layout.torque.stop, layout.pushes.stop):
+        weight[k, k] = 1 / lever_Nm**2
     if layout.bias is not None:
         weight[layout.bias, layout.bias] = np.eye(3) / (_BIAS if layout.skew_rates is not None else _BIAS_ALONE) ** 2
     if prior is not None:
@@ -212,7 +238,14 @@ def carried(loosened: np.ndarray, old: Motion, new: Motion) -> np.ndarray:
 def _near(a: Levels, b: Levels) -> bool:
     return all(
         abs(np.log(getattr(b, n) / getattr(a, n))) < 0.03 for n in ("wheel", "rate", "attitude", "coloured")
-    ) and (abs(b.wander - a.wander) <= 0.05 * a.wander)
+    ) and all(abs(getattr(b, n) - getattr(a, n)) <= 0.05 * getattr(a, n) for n in ("wander", "slow"))
+
+
+def _slow_torque(record: SlewRecord) -> float:
+    """About the size of an outside torque that would explain what plain least squares of momentum leaves over. [N m]"""
+    m = record.momentum
+    left = np.sqrt(plain_fit(record)[1] / len(m.time_s))
+    return max(6 * float(left) / float(np.ptp(m.time_s)), 1e-13)
 
 
 def _start(record: SlewRecord) -> tuple[np.ndarray, Motion]:
