@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.stats import chi2
 
 from ...telemetry.channels import AXES
 from .doubts import MOTOR_AT_WORK, SLOWS_AS_DRIVEN, SLOWS_BY_COMMAND, SLOWS_WITH_OTHERS
@@ -23,6 +24,8 @@ _TURNING = 0.2
 _SHARED = 0.5
 #: An idle motor's torque as a share of what slows the wheel, over each of so many blocks, and how many sigma are sure.
 _IDLE, _BLOCKS, _SURE = 0.1, 16, 4.0
+#: Chance of doubting an idle motor for its sensor's noise.
+_CHANCE = 1e-4
 #: An idle motor's torque, with its sensor's noise, has at most this share of what slows the wheel (root mean square).
 _QUIET = 0.25
 #: Share of a slowing that the commanded torque explains: above it the motor is at work.
@@ -87,10 +90,13 @@ def motor_off(record: RecordedWheels, name: str, start_s: float, stop_s: float, 
         return None
     blocks = np.array_split(torque[inside], int(np.clip(inside.sum() // 6, 2, _BLOCKS)))
     means = np.array([float(np.mean(b)) for b in blocks])
-    errors = np.array([float(np.std(b, ddof=1)) / np.sqrt(len(b)) for b in blocks])
+    scatter = float(np.sqrt(np.mean([np.var(b, ddof=1) for b in blocks])))
+    errors = max(scatter, 1e-12) / np.sqrt([len(b) for b in blocks])
     drag = J * slowing
     if np.any(np.abs(means) > _IDLE * drag + _SURE * errors):
         return False
+    if float(np.sum((means / errors) ** 2)) > chi2.isf(_CHANCE, len(means)):
+        return None
     mean, size = abs(float(np.mean(torque[inside]))), float(np.sqrt(np.mean(torque[inside] ** 2)))
     return True if mean < 0.5 * _IDLE * drag and size < _QUIET * drag else None
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import f as f_ratio
 
 from .doubts import FOLLOWS, MANY_COAST, ROUGH, SLOWS_AS_DRIVEN
-from .run_downs import CURRENT, FEWEST, own_noise
+from .run_downs import CURRENT, FEWEST
 
 if TYPE_CHECKING:
     from ...kit.doubts import Doubt
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 HOLDING = 3
 #: Chance of calling the rougher of two equal courses a follower, and by how much rougher it must be at least (variances).
 _CHANCE, _ROUGHER = 1e-3, 1.5
-#: Samples of white noise that count as independent in a comparison of scatters from second differences.
+#: Share of the samples that counts as independent: a controller's errors last.
 _SHARE = 0.5
 
 
@@ -44,7 +44,7 @@ def without_followers(record: RecordedWheels, seen: dict[str, list[Slowing]]) ->
     refused: set[tuple[str, int]] = set()
     finds = [_find(record, n, s) for n, of_it in seen.items() for s in of_it if s.cause in (None, SLOWS_AS_DRIVEN)]
     for f in finds:
-        if f.which.cause is None and f.which.found_by != CURRENT and (doubt := _refusal(record, f, finds)) is not None:
+        if f.which.cause is None and (doubt := _refusal(record, f, finds)) is not None:
             refused.add((f.wheel, f.which.first))
             doubts.append(doubt)
     doubts += _too_many(record, finds, refused)
@@ -70,17 +70,34 @@ def _find(record: RecordedWheels, name: str, s: Slowing) -> _Find:
 def _refusal(record: RecordedWheels, f: _Find, finds: list[_Find]) -> Doubt | None:
     """Why a find is no run-down: a named one overlaps it, another wheel is smoother meanwhile, or it is rougher than a coast."""
     told = {"wheel": f.wheel, "start_s": f.start_s, "stop_s": f.stop_s}
-    for n, spans in record.run_down.items():
-        if any(a < f.stop_s and b > f.start_s for a, b in spans):
-            return FOLLOWS(**told, other=n)
+    sure = f.which.found_by == CURRENT
+    if not sure and not _is_long(f):
+        return ROUGH(**told)
+    if not sure and (named := _named_beside(record, f)):
+        return FOLLOWS(**told, other=named)
+    if sure:  # nothing but another idle motor can contradict that
+        finds = [o for o in finds if o.which.found_by == CURRENT]
     for o in finds:
         if o.wheel != f.wheel and (both := _together(f, o)) is not None:
-            if o.which.found_by == CURRENT or _rougher(*(_scatter(record.finders[x.wheel], *both) for x in (f, o))):
+            idle = o.which.found_by == CURRENT and not sure
+            if idle or _rougher(*(_scatter(record.finders[x.wheel], *both) for x in (f, o))):
                 return FOLLOWS(**told, other=o.wheel)
-    quiet = min((_noise(record, o) for o in finds if o.which.cause is None), default=None)
-    if quiet is not None and _rougher(_noise(record, f), quiet):
+    of_all = (_scatter(record.finders[o.wheel], o.start_s, o.stop_s) for o in finds if _is_long(o))
+    quiet = min(of_all, default=None)
+    if quiet is not None and not sure and _rougher(_scatter(record.finders[f.wheel], f.start_s, f.stop_s), quiet):
         return ROUGH(**told)
     return None
+
+
+def _is_long(f: _Find) -> bool:
+    """A run-down too long to be by chance what a motor at work does."""
+    return f.which.cause is None and f.which.end - f.which.first >= 2 * FEWEST
+
+
+def _named_beside(record: RecordedWheels, f: _Find) -> str:
+    """A wheel whose named run-down overlaps this find; '' for none."""
+    beside = (n for n, spans in record.run_down.items() if any(a < f.stop_s and b > f.start_s for a, b in spans))
+    return next(beside, "")
 
 
 def _too_many(record: RecordedWheels, finds: list[_Find], refused: set[tuple[str, int]]) -> list[Doubt]:
@@ -88,12 +105,26 @@ def _too_many(record: RecordedWheels, finds: list[_Find], refused: set[tuple[str
     left = [f for f in finds if f.which.cause is None and (f.wheel, f.which.first) not in refused]
     most, doubts = record.count - HOLDING, []
     for f in left:
-        beside = [o for o in left if o.wheel != f.wheel and _together(f, o) is not None]
-        if len({o.wheel for o in beside}) + 1 > most and f.which.found_by != CURRENT:
-            refused.add((f.wheel, f.which.first))
-            others = sorted({o.wheel for o in beside})
-            doubts.append(MANY_COAST(wheel=f.wheel, others=others, start_s=f.start_s, stop_s=f.stop_s, most=most))
+        beside = {o.wheel: o for o in left if o.wheel != f.wheel and _together(f, o) is not None}
+        if len(beside) + 1 <= most:
+            continue
+        told = {"wheel": f.wheel, "start_s": f.start_s, "stop_s": f.stop_s}
+        if f.which.found_by == CURRENT:  # idle motors: the smoothest coast, the others hardly work
+            smoother = [o.wheel for o in beside.values() if _smoother(record, o, f)]
+            if len(smoother) < most:
+                continue
+            doubts.append(FOLLOWS(**told, other=smoother[0]))
+        else:
+            doubts.append(MANY_COAST(**told, others=sorted(beside), most=most))
+        refused.add((f.wheel, f.which.first))
     return doubts
+
+
+def _smoother(record: RecordedWheels, o: _Find, f: _Find) -> bool:
+    """Whether the first scatters less than the second while both slow."""
+    both = _together(f, o) or (f.start_s, f.stop_s)
+    one, other = (_scatter(record.finders[x.wheel], *both)[0] for x in (o, f))
+    return one < other
 
 
 def _together(f: _Find, o: _Find) -> tuple[float, float] | None:
@@ -109,15 +140,7 @@ def _scatter(finder: Finder, start_s: float, stop_s: float) -> tuple[float, int]
     if b - a < FEWEST // 2:
         return 0.0, 0
     _, _, _, r, _ = finder.fitted(int(a), int(b))
-    return float(np.mean(r**2)) + finder.quantum**2 / 12, int(b - a) - 3
-
-
-def _noise(record: RecordedWheels, f: _Find) -> tuple[float, int]:
-    """The same of white noise alone."""
-    finder = record.finders[f.wheel]
-    span = finder.span(f.which.first, f.which.end)
-    white = own_noise(span.u, span.s)
-    return white**2 + finder.quantum**2 / 12, int(_SHARE * len(span.s))
+    return float(np.mean(r**2)) + finder.quantum**2 / 12, int(_SHARE * (b - a)) - 3
 
 
 def _rougher(one: tuple[float, int], other: tuple[float, int]) -> bool:
