@@ -46,7 +46,15 @@ def trend_figure(first: FigureHealth, *others: FigureHealth, title: str | None =
         )
         if f.doubted:
             doubted = [datetime.fromisoformat(r.date) for r in f.doubted]
-            ax.plot(doubted, [scale * r.value for r in f.doubted], marker, mfc="none", color=color, ms=5, label="doubted, not judged")
+            ax.plot(
+                doubted,
+                [scale * r.value for r in f.doubted],
+                marker,
+                mfc="none",
+                color=color,
+                ms=5,
+                label="doubted, not judged",
+            )
     t = first.trend
     if t is not None and len(first.rows) >= FEWEST:
         end = t.values.day[-1] + 0.1 * np.ptp(t.values.day)

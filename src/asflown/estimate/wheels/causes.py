@@ -28,6 +28,8 @@ _IDLE, _BLOCKS, _SURE = 0.1, 16, 4.0
 _CHANCE = 1e-4
 #: An idle motor's torque, with its sensor's noise, has at most this share of what slows the wheel (root mean square).
 _QUIET = 0.25
+#: Above this share the motor, or a sensor that shows nothing of use, is at work.
+_LOUD = 0.5
 #: Share of a slowing that the commanded torque explains: above it the motor is at work.
 _COMMANDED = 0.5
 
@@ -95,20 +97,30 @@ def motor_off(record: RecordedWheels, name: str, start_s: float, stop_s: float, 
     drag = J * slowing
     if np.any(np.abs(means) > _IDLE * drag + _SURE * errors):
         return False
+    mean, size = abs(float(np.mean(torque[inside]))), float(np.sqrt(np.mean(torque[inside] ** 2)))
+    of_all = scatter / np.sqrt(float(inside.sum()))
+    if size > _LOUD * drag or mean > _IDLE * drag + _SURE * of_all:
+        return False
     if float(np.sum((means / errors) ** 2)) > chi2.isf(_CHANCE, len(means)):
         return None
-    mean, size = abs(float(np.mean(torque[inside]))), float(np.sqrt(np.mean(torque[inside] ** 2)))
     return True if mean < 0.5 * _IDLE * drag and size < _QUIET * drag else None
 
 
 def _by_command(record: RecordedWheels, name: str, way: float, start_s: float, stop_s: float) -> float:
-    """Slowing that the commanded torque gives a wheel turning this ``way``; 0 where it is not known. [rad/s^2]"""
+    """Slowing that the commanded torque gives a wheel turning this ``way``; 0 where it is not known. [rad/s^2]
+
+    A command of the wheel's own counts double, and its scatter too: it is surer than a share of the torque on the body."""
     commanded, J = record.commanded(name), record.described(name).spin_inertia
     if commanded is None or J is None:
         return 0.0
     t, torque = commanded
     inside = (t >= start_s) & (t <= stop_s)
-    return -way * float(np.mean(torque[inside])) / J if inside.any() else 0.0
+    if not inside.any():
+        return 0.0
+    mean = -way * float(np.mean(torque[inside])) / J
+    if record.commanded_of_wheel(name) is None:
+        return mean
+    return 2 * max(mean, float(np.std(torque[inside])) / J)
 
 
 def _shared(record: RecordedWheels, name: str, seen: dict[str, list[Slowing]], s: Slowing) -> Kind | None:

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import cholesky_banded, solve_banded
 from scipy.optimize import minimize_scalar
-from scipy.stats import chi2
 
 from ...kit.scatter import robust_sigma
 from .run_downs import STICTION_RATE
@@ -25,13 +24,13 @@ if TYPE_CHECKING:
     from .run_downs import Finder
 
 #: Most steps that are fitted, and fewest; longer records take longer steps.
-_MOST, _FEWEST = 4000, 60
+_MOST, _FEWEST = 4000, 120
 #: Torque further apart than this many of its usual steps has a gap.
 _GAP = 3.5
 #: Steps this many sigma off the law are left out.
 _FAR = 6.0
-#: Blocks in which whitened errors are averaged: those of a law that holds average out.
-_BLOCKS = 24
+#: Blocks of steps from which the scatter of the values is seen.
+_BLOCKS = 100
 #: Blocks that compare the torque with the momentum gained, and by how many times the errors they must move.
 _SCALE_BLOCKS, _MOVED = 40, 5.0
 #: Share of the steps in which a wheel turns the other way, from which the torque's zero is fitted too.
@@ -117,14 +116,13 @@ def motor_law(steps: Steps) -> MotorLaw | None:
     size = np.linalg.norm(X, axis=0)
     kept = np.ones(len(X), bool)
     for _ in range(4):
-        x, inverse, errors = _generalised(X / size, steps, kept)
+        x, A, errors = _generalised(X / size, steps, kept)
         sigma = robust_sigma(errors[kept])
         again = np.abs(errors) <= _FAR * sigma if sigma > 0 else kept
         if np.array_equal(again, kept) or again.sum() < _FEWEST:
             break
         kept = again
-    variance = float(np.sum(errors[kept] ** 2) / max(kept.sum() - X.shape[1], 1)) * _widened(errors[kept])
-    covariance = variance * inverse / np.outer(size, size)
+    covariance = _covariance(A[kept], errors[kept]) / np.outer(size, size)
     if not (np.isfinite(covariance).all() and np.isfinite(x).all()):
         return None
     rate = float(np.sum(steps.turned[kept]) / np.sum(steps.dt[kept]))
@@ -132,7 +130,7 @@ def motor_law(steps: Steps) -> MotorLaw | None:
 
 
 def _generalised(X, steps: Steps, kept):
-    """Values, (X' C^-1 X)^-1 and whitened errors, at the correlation that is likeliest."""
+    """Values, whitened columns and whitened errors, at the correlation that is likeliest."""
 
     def whitened(u: float):
         share = np.tan(0.5 * np.pi * u)  # of the correlated part, either sign
@@ -151,21 +149,26 @@ def _generalised(X, steps: Steps, kept):
     best = float(tried[int(np.argmin([whitened(u)[0] for u in tried]))])
     near = minimize_scalar(lambda u: whitened(u)[0], bounds=(max(best - 0.09, -0.999), min(best + 0.09, 0.999)), method="bounded")  # fmt: skip
     _, x, A, errors = whitened(float(near.x))
-    return x, np.linalg.pinv(A.T @ A), errors
+    return x, A, errors
 
 
-def _widened(errors) -> float:
-    """Factor on the variance: how much more whitened errors scatter in blocks than independent ones would."""
-    blocks = np.array_split(errors, _BLOCKS)
-    sizes = np.array([np.sum(b) / np.sqrt(len(b)) for b in blocks]) / max(float(np.std(errors)), 1e-300)
-    total = float(sizes @ sizes)
-    return total / _BLOCKS if total > chi2.isf(0.01, _BLOCKS) else 1.0
+def _covariance(A, errors) -> np.ndarray:
+    """Of the values: as for even and independent errors, widened where those of blocks of steps show more.
+
+    A motor works harder at some times than at others, and what it does between samples may last."""
+    inverse = np.linalg.pinv(A.T @ A)
+    plain = float(errors @ errors) / max(len(errors) - A.shape[1], 1) * inverse
+    scores = np.array([A[b].T @ errors[b] for b in np.array_split(np.arange(len(errors)), _BLOCKS)])
+    seen = inverse @ (scores.T @ scores) @ inverse * _BLOCKS / (_BLOCKS - A.shape[1])
+    return plain * max(1.0, float(np.max(np.diag(seen) / np.diag(plain))))
 
 
 def _scale(steps: Steps, kept) -> tuple[float, float] | None:
     """Torque's integral over momentum gained beside the drag, by least squares over long blocks."""
     rows = np.array_split(np.flatnonzero(kept), _SCALE_BLOCKS)
-    table = np.array([[steps.lost[r].sum(), steps.dt[r].sum(), steps.turned[r].sum(), steps.gained[r].sum()] for r in rows])
+    table = np.array(
+        [[steps.lost[r].sum(), steps.dt[r].sum(), steps.turned[r].sum(), steps.gained[r].sum()] for r in rows]
+    )
     y, X = table[:, 0], table[:, 1:]
     size = np.linalg.norm(X, axis=0)
     if not np.all(size > 0):

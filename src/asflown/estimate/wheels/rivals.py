@@ -36,7 +36,9 @@ class _Find(NamedTuple):
     stop_s: float
 
 
-def without_followers(record: RecordedWheels, seen: dict[str, list[Slowing]]) -> tuple[dict[str, list[Slowing]], list[Doubt]]:
+def without_followers(
+    record: RecordedWheels, seen: dict[str, list[Slowing]]
+) -> tuple[dict[str, list[Slowing]], list[Doubt]]:
     """The slowings with a cause for those that follow another wheel, and a doubt each; as they are for up to three wheels."""
     if record.count <= HOLDING:
         return seen, []

@@ -38,7 +38,11 @@ _APART = 4.0
 
 @recorded
 def wheels(
-    telemetry: Telemetry, craft: Craft, *, low_speed_rad_s: float = LOW_SPEED, run_down: Collection[str | NamedRunDown] = ()
+    telemetry: Telemetry,
+    craft: Craft,
+    *,
+    low_speed_rad_s: float = LOW_SPEED,
+    run_down: Collection[str | NamedRunDown] = (),
 ) -> WheelsResult:
     """Bearing drag of each wheel that has a rate, drag spikes, and how the wheel was used.
 

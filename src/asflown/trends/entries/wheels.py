@@ -11,6 +11,7 @@ from .of_record import record_entry
 if TYPE_CHECKING:
     from ...craft.model import Craft
     from ...estimate.wheels import WheelDrag, WheelsResult
+    from ...estimate.wheels.result import DragFit
     from ...telemetry.telemetry import Telemetry
 
 KIND = "wheels"
@@ -45,12 +46,11 @@ def wheel_entry(
     BadInput
         For telemetry without an epoch.
     """
-    values = tuple(v for w in result.wheels for v in _values(w, guesses))
+    values = tuple(v for w in result.wheels for v in _values(w, w.fit if guesses else w.known_fit))
     return record_entry(KIND, values, result.doubts, telemetry, craft, event_id, result.provenance)
 
 
-def _values(w: WheelDrag, guesses: bool):
-    f = w.fit if guesses else w.known_fit
+def _values(w: WheelDrag, f: DragFit | None):
     torque, per_rate = ("N m", "N m s")
     if f is not None and f.relative:
         torque, per_rate = "rad/s^2, per unit spin inertia", "1/s, per unit spin inertia"
