@@ -44,6 +44,17 @@ def trend_figure(first: FigureHealth, *others: FigureHealth, title: str | None =
         ax.errorbar(
             when, values, yerr=sigmas if any(sigmas) else None, fmt=marker, color=color, ms=5, lw=1, label=label
         )
+        if f.doubted:
+            doubted = [datetime.fromisoformat(r.date) for r in f.doubted]
+            ax.plot(
+                doubted,
+                [scale * r.value for r in f.doubted],
+                marker,
+                mfc="none",
+                color=color,
+                ms=5,
+                label="doubted, not judged",
+            )
     t = first.trend
     if t is not None and len(first.rows) >= FEWEST:
         end = t.values.day[-1] + 0.1 * np.ptp(t.values.day)

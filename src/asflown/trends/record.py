@@ -21,6 +21,7 @@ def figure_record(f: FigureHealth) -> dict:
         "basis": f.basis,
         "unit": f.unit,
         "rows": [{"event": r.event, "date": r.date, "value": r.value, "sigma": r.sigma} for r in f.rows],
+        "doubted_rows": [{"event": r.event, "date": r.date, "value": r.value, "sigma": r.sigma} for r in f.doubted],
         "change_percent": t.change_percent if t else None,
         "change_percent_ci95": list(t.change_percent_ci95) if t and t.change_percent_ci95 else None,
         "p_value": t.p_value if t else None,

@@ -68,7 +68,9 @@ class Row:
 
 @dataclass(frozen=True)
 class FigureHealth:
-    """One figure over the years.  ``reasons``: why the verdict is not pass."""
+    """One figure over the years.  ``reasons``: why the verdict is not pass.
+
+    ``doubted``: values that are shown, not judged, since their own event has a suspect or void doubt about them."""
 
     figure: str
     basis: str
@@ -83,6 +85,7 @@ class FigureHealth:
     limit_reached: tuple[float | None, float | None] = (None, None)  # days from 2000: band's edge, line
     verdict: str = "pass"
     reasons: tuple[str, ...] = ()
+    doubted: tuple[Row, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -132,6 +135,11 @@ NEWEST_NOT_JUDGED = Kind(
 NO_PAIR = Kind(
     "trends.no-pair", Severity.NOTE,
     "there is no cold and warm pair: no event after {cold_days:g} days of rest is followed by another within {warm_days:g} days",
+)  # fmt: skip
+DOUBTED = Kind(
+    "trends.doubted", Severity.CAUTION,
+    "{figure} is shown, not judged, in {events} of its events, whose doubts about it are suspect or void",
+    "Look at the doubts of those events; a run-down can be named with --run-down.",
 )  # fmt: skip
 IN_EVENT = Kind("trends.in-event", Severity.SUSPECT, "{event}: {sentence}")
 
@@ -193,8 +201,13 @@ def judge(
     return Health(
         of_kind[-1].craft, kind, tuple(of_kind), tuple(figures), shape, shape_p, tuple(pairs), tuple(same),
         curve_distances(of_kind, pairs, kind), rests(entries), used, cycles_allowed, ORDER[worst],
-        tuple(r for v, r in sorted(verdicts, key=lambda x: -ORDER.index(x[0]))), _doubts(of_kind, pairs),
+        tuple(r for v, r in sorted(verdicts, key=lambda x: -ORDER.index(x[0]))), _doubts(of_kind, pairs, figures),
     )  # fmt: skip
+
+
+def is_doubted(entry: Entry, figure: str) -> bool:
+    """Whether a suspect or void doubt of an entry is about the wheel that a figure belongs to."""
+    return any(d.is_grave and (w := d.about.get("wheel")) and figure.endswith(f"_{w}") for d in entry.doubts)
 
 
 def values_of(entries: list[Entry], figure: str, basis: str) -> tuple[list[Entry], Values]:
@@ -224,17 +237,23 @@ def _judged(f: FigureHealth) -> bool:
 
 
 def _figure(entries: list[Entry], name: str, basis: str) -> FigureHealth:
-    held, values = values_of(entries, name, basis)
+    sound = [e for e in entries if not is_doubted(e, name)]
+    held, values = values_of(sound, name, basis)
+    doubted = _rows(*values_of([e for e in entries if is_doubted(e, name)], name, basis))
     unit = next(v.unit for e in entries if (v := e.value(name, basis)) is not None)
-    rows = tuple(
+    rows = _rows(held, values)
+    if len(rows) < 3 or values.day[-1] <= values.day[0]:
+        return FigureHealth(name, basis, unit, rows, doubted=doubted)
+    trend = trend_of(values)
+    found = FigureHealth(name, basis, unit, rows, trend, step_of(values, trend.sigmas), doubted=doubted)
+    return replace(found, newest=newest_of(values)) if _judged(found) else found
+
+
+def _rows(held: list[Entry], values: Values) -> tuple[Row, ...]:
+    return tuple(
         Row(e.event, e.date, float(v), float(s) or None)
         for e, v, s in zip(held, values.value, values.sigma, strict=True)
     )
-    if len(rows) < 3 or values.day[-1] <= values.day[0]:
-        return FigureHealth(name, basis, unit, rows)
-    trend = trend_of(values)
-    found = FigureHealth(name, basis, unit, rows, trend, step_of(values, trend.sigmas))
-    return replace(found, newest=newest_of(values)) if _judged(found) else found
 
 
 def _shape(entries: list[Entry]) -> Shape | None:
@@ -321,7 +340,7 @@ def _cycle_verdict(used: float, allowed: int | None) -> list[tuple[str, str]]:
     return [(level, f"{used:g} of {allowed} allowed cycles are used")]
 
 
-def _doubts(entries: list[Entry], pairs: list[Pair]) -> Doubts:
+def _doubts(entries: list[Entry], pairs: list[Pair], figures: list[FigureHealth]) -> Doubts:
     found: list[Doubt] = []
     n = len(entries)
     if n < FEWEST:
@@ -332,6 +351,7 @@ def _doubts(entries: list[Entry], pairs: list[Pair]) -> Doubts:
         found.append(NEWEST_NOT_JUDGED(needed=FEWEST_PAST))
     if not pairs and entries[-1].kind in MOVES:
         found.append(NO_PAIR(cold_days=COLD_DAYS, warm_days=WARM_DAYS))
+    found += [DOUBTED(figure=f.figure, events=len(f.doubted)) for f in figures if f.doubted]
     for e in entries:
         found += [IN_EVENT(event=e.event, sentence=str(d), of=d.kind.id) for d in e.doubts if d.is_grave]
     return Doubts(found)

@@ -368,7 +368,7 @@ def test_a_few_samples_are_no_error(count):
 
 def test_entry_for_the_store():
     flight, result = studied(seed=1)
-    entry = wheel_entry(result, flight.telemetry, flight.craft, "run-down-2015-272")
+    entry = wheel_entry(result, flight.telemetry, flight.craft, "run-down-2015-272", guesses=True)
     assert (entry.kind, entry.craft, entry.date) == ("wheels", "cassini", "2015-09-29T00:00:00")
     stems = ("coulomb_drag", "viscous_drag", "drag_spikes", "low_speed_dwell", "zero_crossings", "revolutions")
     assert {v.figure for v in entry.values} == {f"{s}_{w}" for s in stems for w in flight.wheels}

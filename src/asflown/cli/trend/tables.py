@@ -17,6 +17,8 @@ def print_figure(f, rows: bool) -> None:
     if rows:
         for r in f.rows:
             print(f"  {r.event:24s} {r.date[:10]}  {r.value:+.4g}" + ("" if r.sigma is None else f" ± {r.sigma:.2g}"))
+        for r in f.doubted:
+            print(f"  {r.event:24s} {r.date[:10]}  {r.value:+.4g}   doubted: not judged")
     if t is None:
         print("  too few events for a trend")
         return

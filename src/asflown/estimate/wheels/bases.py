@@ -7,15 +7,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...kit.regression import robust_line
+from .causes import motor_off
 from .doubts import (
     COMMAND_INCOMPLETE,
     COMMAND_SHOWS_NONE,
+    CURRENT_ZERO,
+    FOLLOWS,
     FOUND_BY_SHAPE,
     MISFIT,
+    NAMED_BUT_DRIVEN,
     PER_SPIN_INERTIA,
+    TORQUE_SCALE,
 )
-from .result import COMMAND, FLIGHT_SOFTWARE, RUN_DOWN, DragFit, DragSamples, Spike
-from .run_downs import FEWEST, STICTION_RATE, Coasting, common_law
+from .motor import motor_law, steps_of
+from .result import COMMAND, FLIGHT_SOFTWARE, MOTOR_CURRENT, RUN_DOWN, WHEEL_COMMAND, DragFit, DragSamples, Spike
+from .run_downs import CURRENT, FEWEST, NAMED, SHAPE, STICTION_RATE, Coasting, common_law
 from .samples import find_spikes, opposing
 
 if TYPE_CHECKING:
@@ -25,6 +31,10 @@ if TYPE_CHECKING:
 
 #: Length over which commanded torque and momentum gained are compared [s], and how many of them it takes.
 _BLOCK_S, _FEWEST_BLOCKS = 60.0, 6
+#: A named span reaches this far to samples beside it: dates are rounded. [s]
+_EDGE = 1e-3
+#: The motor's torque is off its scale by more than this share, and by this many sigma.
+_SCALE, _SCALE_SIGMAS = 0.05, 5.0
 #: Drag below this many sigma is none.
 NONE = 3.0
 #: Slow residuals this many times the noise are doubted.
@@ -33,20 +43,48 @@ _MISFIT = 2.0
 
 def coasting_of(record: RecordedWheels, name: str, seen: list[Slowing]) -> tuple[Coasting | None, list[Doubt]]:
     """The law of drag of a wheel's run-downs; None where it has none."""
-    finder, named, doubts = record.finders[name], name in record.run_down, _no_run_downs(record, name, seen)
-    if named:
-        spans = [(s.start, s.stop) for s in finder.stretches() if finder.falls(s.start, s.stop)]
+    finder, doubts = record.finders[name], _no_run_downs(record, name, seen)
+    if name in record.run_down:
+        spans, found_by = _named_spans(record, name), NAMED
+        doubts += _driven(record, name, spans)
     else:
-        spans = [(s.first, s.end) for s in seen if s.cause is None]
+        coasts = [s for s in seen if s.cause is None]
+        sure = [s for s in coasts if s.found_by == CURRENT]
+        spans, found_by = [(s.first, s.end) for s in sure or coasts], CURRENT if sure else SHAPE
     if not spans:
         return None, doubts
-    found = common_law(finder, spans, named=named)
-    if not named:
+    found = common_law(finder, spans, found_by)
+    if found_by == SHAPE:
         first = found.run_downs[0]
         doubts.append(FOUND_BY_SHAPE(wheel=name, run_downs=len(spans), start_s=first.start_s, stop_s=first.stop_s))
     if found.misfit > _MISFIT**2:
         doubts.append(MISFIT(wheel=name, ratio=float(np.sqrt(found.misfit))))
     return found, doubts
+
+
+def _named_spans(record: RecordedWheels, name: str) -> list[tuple[int, int]]:
+    """Samples in which the user says that a wheel coasts, and it does slow."""
+    finder, found = record.finders[name], []
+    for start, stop in record.run_down[name]:
+        first, end = np.searchsorted(finder.t, [start - _EDGE, stop + _EDGE])
+        for s in finder.stretches():
+            a, b = max(s.start, int(first)), min(s.stop, int(end))
+            if b - a >= FEWEST and finder.falls(a, b):
+                found.append((a, b))
+    return sorted(set(found))
+
+
+def _driven(record: RecordedWheels, name: str, spans: list[tuple[int, int]]) -> list[Doubt]:
+    """Named run-downs in which the current shows a motor at work."""
+    finder, found = record.finders[name], []
+    for a, b in spans:
+        start, stop = float(finder.t[a]), float(finder.t[b - 1])
+        slowing = float(np.abs(finder.rate[a]) - np.abs(finder.rate[b - 1])) / (stop - start)
+        if motor_off(record, name, start, stop, slowing) is False:
+            t, torque = record.motor_torque(name)  # type: ignore[misc]
+            mean = float(np.mean(torque[(t > start) & (t < stop)]))
+            found.append(NAMED_BUT_DRIVEN(wheel=name, start_s=start, stop_s=stop, torque_Nm=mean))
+    return found
 
 
 def _no_run_downs(record: RecordedWheels, name: str, seen: list[Slowing]) -> list[Doubt]:
@@ -56,7 +94,7 @@ def _no_run_downs(record: RecordedWheels, name: str, seen: list[Slowing]) -> lis
         stretches = [s for s in seen if s.cause == cause]
         longest = max(stretches, key=lambda s: s.end - s.first)
         # a wheel in the loop slows steadily for so short a time by chance
-        if cause is not None and longest.end - longest.first >= 2 * FEWEST:
+        if cause not in (None, FOLLOWS) and longest.end - longest.first >= 2 * FEWEST:
             start_s, stop_s = float(t[longest.first]), float(t[longest.end - 1])
             doubts.append(cause(wheel=name, spans=len(stretches), start_s=start_s, stop_s=stop_s))
     return doubts
@@ -70,12 +108,39 @@ def from_run_downs(record: RecordedWheels, name: str, coasting: Coasting) -> tup
     return fit, [PER_SPIN_INERTIA(wheel=name)] if J is None else []
 
 
+def from_motor(
+    record: RecordedWheels, name: str, coasts: list[tuple[float, float]]
+) -> tuple[list[DragFit], list[Doubt]]:
+    """From the motor's own torque, by its current and as commanded.  ``coasts``: spans of this wheel's run-downs [s], which show
+    the drag by themselves."""
+    J, fits, doubts = record.described(name).spin_inertia, [], []
+    ways = ((MOTOR_CURRENT, record.motor_torque(name)), (WHEEL_COMMAND, record.commanded_of_wheel(name)))
+    for basis, known in ways:
+        steps = None if known is None or J is None else steps_of(record.finders[name], *known, J, coasts)
+        law = None if steps is None else motor_law(steps)
+        if law is None:
+            continue
+        fit = DragFit.from_law(basis, law.values, law.covariance, law.rate)
+        if basis == WHEEL_COMMAND and fit.drag_at_mean_Nm <= NONE * fit.drag_at_mean_sigma_Nm:
+            sizes = {"drag_Nm": fit.drag_at_mean_Nm, "drag_sigma_Nm": fit.drag_at_mean_sigma_Nm}
+            doubts.append(COMMAND_SHOWS_NONE(wheel=name, **sizes))
+            continue
+        fits.append(fit)
+        if basis == WHEEL_COMMAND:
+            doubts.append(COMMAND_INCOMPLETE(wheel=name))
+        elif not law.zero_fitted:
+            doubts.append(CURRENT_ZERO(wheel=name))
+        if law.scale is not None and abs(law.scale[0] - 1) > max(_SCALE, _SCALE_SIGMAS * law.scale[1]):
+            doubts.append(TORQUE_SCALE(wheel=name, basis=basis, scale=law.scale[0], scale_sigma=law.scale[1]))
+    return fits, doubts
+
+
 def from_command(
     record: RecordedWheels, name: str, coasts: list[tuple[float, float]]
 ) -> tuple[DragFit | None, list[Doubt]]:
     """Commanded torque less momentum gained, block by block: h_dot = commanded - drag.  ``coasts``: spans of any wheel's run-downs [s]."""
     commanded, J = record.commanded(name), record.described(name).spin_inertia
-    if commanded is None or J is None:
+    if commanded is None or J is None or record.commanded_of_wheel(name) is not None:
         return None, []
     rate, drag = _in_blocks(record, name, *commanded, J, coasts)
     if len(rate) < _FEWEST_BLOCKS:

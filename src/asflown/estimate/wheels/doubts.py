@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...kit.doubts import Kind, Severity
 
-_MOTOR_OFF = "If the motor was off: --run-down {wheel}, with --start and --stop."
+_MOTOR_OFF = "If the motor was off: --run-down {wheel}:{start_s:.0f}-{stop_s:.0f}."
 
 
 def _no_run_down(what: str, cause: str) -> Kind:
@@ -21,10 +21,46 @@ SLOWS_AS_DRIVEN = _no_run_down("as-driven", "as a motor or a steady torque on th
 SLOWS_WITH_OTHERS = _no_run_down(
     "with-others", "other wheels change with it, as a torque on the body would change them"
 )
+MOTOR_AT_WORK = _no_run_down("with-motor", "the current shows that its motor is at work")
+FOLLOWS = Kind(
+    "wheels.follows", Severity.NOTE,
+    "wheel {wheel} slows from {start_s:.0f} to {stop_s:.0f} s while wheel {other} coasts: it follows, as the wheels that hold the "
+    "attitude do, and this is not used as a run-down", _MOTOR_OFF,
+)  # fmt: skip
+ROUGH = Kind(
+    "wheels.rough", Severity.NOTE,
+    "wheel {wheel} slows from {start_s:.0f} to {stop_s:.0f} s, but less smoothly than a coasting wheel of this craft: this is not "
+    "used as a run-down", _MOTOR_OFF,
+)  # fmt: skip
+MANY_COAST = Kind(
+    "wheels.many-coast", Severity.CAUTION,
+    "wheels {wheel} and {others} slow together from {start_s:.0f} to {stop_s:.0f} s, each as its bearing would slow it, and at most "
+    "{most} can coast while the others hold the attitude: which of them coasts is not known, so this is not used as a run-down",
+    _MOTOR_OFF,
+)  # fmt: skip
+NAMED_BUT_DRIVEN = Kind(
+    "wheels.named-but-driven", Severity.SUSPECT,
+    "wheel {wheel} is said to coast from {start_s:.0f} to {stop_s:.0f} s, but its motor's torque is {torque_Nm:+.2g} N m there",
+    "Check the span of --run-down, and torque_constant in the craft file.",
+)  # fmt: skip
+NONE_LISTED_HERE = Kind(
+    "wheels.none-listed-here", Severity.NOTE, "none of the run-downs named lies in this telemetry: {wheels}"
+)
+CURRENT_ZERO = Kind(
+    "wheels.current-zero", Severity.CAUTION,
+    "wheel {wheel} turns mostly one way: an error in the zero of its motor's current appears as Coulomb drag and is not in the sigma",
+    "A run-down shows the drag without the current.",
+)  # fmt: skip
+TORQUE_SCALE = Kind(
+    "wheels.torque-scale", Severity.SUSPECT,
+    "wheel {wheel}, {basis}: the motor's torque is {scale:.3f} ± {scale_sigma:.3f} times what its spin inertia and rate need",
+    "Check torque_constant and spin_inertia in the craft file, and the unit and sense of the channel.",
+)  # fmt: skip
 FOUND_BY_SHAPE = Kind(
     "wheels.run-down-by-shape", Severity.NOTE,
     "wheel {wheel}: a run-down is assumed from {start_s:.0f} to {stop_s:.0f} s (run-downs in all: {run_downs}): only a bearing "
     "explains the wheel's course, and nothing in the file says that the motor was off",
+    "If the motor was off: --run-down {wheel}:{start_s:.0f}-{stop_s:.0f}; else --store does not keep it without --store-guesses.",
 )  # fmt: skip
 MISFIT = Kind(
     "wheels.misfit", Severity.SUSPECT,
@@ -74,7 +110,7 @@ DRAG_UNKNOWN = Kind(
     "wheels.drag-unknown", Severity.NOTE,
     "drag is not known of wheel {wheels}: there is no run-down, and in the loop the motor compensates drag, so that the rate alone "
     "does not show it",
-    "Add wheel_drag_torque_<WHEEL> or control_torque_x|y|z, or take a record with a run-down.",
+    "Add wheel_current_<WHEEL>, wheel_torque_<WHEEL>, wheel_drag_torque_<WHEEL> or control_torque_x|y|z, or take a record with a run-down.",
 )  # fmt: skip
 ON_THE_WHEEL = Kind(
     "wheels.sign-on-the-wheel", Severity.NOTE,

@@ -11,6 +11,7 @@ import numpy as np
 from ...kit.errors import BadInput, some_of
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
+from .named import named_run_downs, spans_of
 from .run_downs import Finder
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
     from ...craft.model import Craft, CraftAt, Wheel
     from ...telemetry.telemetry import Telemetry
+    from .named import NamedRunDown
 
 #: Condition number of three wheels' axes beyond which their shares of a torque are not told.
 _ALIGNED = 1e3
@@ -25,22 +27,48 @@ _ALIGNED = 1e3
 
 @dataclass(frozen=True)
 class RecordedWheels:
-    """``finders``: the course of each wheel that has a rate; ``run_down``: wheels whose motor is off, as the user says."""
+    """``finders``: the course of each wheel that has a rate; ``run_down``: spans [s] in which a wheel's motor is off, as the user
+    says."""
 
     telemetry: Telemetry
     craft: Craft
     now: CraftAt
     finders: dict[str, Finder]
-    run_down: frozenset[str]
+    run_down: dict[str, tuple[tuple[float, float], ...]]
 
     def described(self, name: str) -> Wheel:
         """As it is in service then; a spare one as it was described last."""
         return self.now.wheel(name) or [w for w in self.craft.wheels if w.name == name][-1]
 
+    @property
+    def count(self) -> int:
+        """Wheels in service."""
+        return len(self.now.wheels)
+
+    def motor_torque(self, name: str) -> tuple[np.ndarray, np.ndarray] | None:
+        """Seconds (N,) and a motor's torque from its current (N,) [N m]; None where that is not known."""
+        constant, channel = self.described(name).torque_constant, f"wheel_current_{name}"
+        if constant is None or channel not in self.telemetry:
+            return None
+        c = self.telemetry.channel(channel).usable
+        return self.telemetry.seconds(c.tai_ns), constant * c.values
+
+    def commanded_of_wheel(self, name: str) -> tuple[np.ndarray, np.ndarray] | None:
+        """Seconds (N,) and the torque commanded of this wheel's own motor (N,) [N m]; None without such a channel."""
+        channel = f"wheel_torque_{name}"
+        if channel not in self.telemetry:
+            return None
+        c = self.telemetry.channel(channel).usable
+        return self.telemetry.seconds(c.tai_ns), c.values
+
     def commanded(self, name: str) -> tuple[np.ndarray, np.ndarray] | None:
         """Seconds (N,) and the torque commanded of a wheel's motor (N,) [N m]; None where that is not known.
 
-        Three wheels share a torque on the body in one way only; with four it depends on software not described."""
+        Without a channel of its own: three wheels share a torque on the body in one way only; with four it depends on
+        software not described."""
+        own = self.commanded_of_wheel(name)
+        if own is not None:
+            return own
         names = [w.name for w in self.now.wheels]
         if self._commanded is None or name not in names:
             return None
@@ -60,7 +88,7 @@ class RecordedWheels:
         return tlm.seconds(tai_ns), -torque @ np.linalg.inv(axes).T
 
 
-def record_of(telemetry: Telemetry, craft: Craft, run_down: Collection[str]) -> RecordedWheels:
+def record_of(telemetry: Telemetry, craft: Craft, run_down: Collection[str | NamedRunDown]) -> RecordedWheels:
     """Raises BadInput for telemetry without wheel rates, a wheel that the craft does not have, and one in ``run_down`` without
     a rate."""
     names = telemetry.members("wheel_rate")
@@ -79,7 +107,8 @@ def record_of(telemetry: Telemetry, craft: Craft, run_down: Collection[str]) -> 
                 channel=f"wheel_rate_{name}",
                 remedy=f"Its wheels: {some_of(craft.wheel_names)}. Rename the column, or name the right --craft.",
             )
-    for name in run_down:
+    spans = spans_of(named_run_downs(run_down), telemetry)
+    for name in spans:
         if name not in names:
             raise BadInput(
                 f"no rate of wheel {name!r}, whose run-down this is said to be",
@@ -88,4 +117,4 @@ def record_of(telemetry: Telemetry, craft: Craft, run_down: Collection[str]) -> 
             )
     channels = {n: telemetry.channel(f"wheel_rate_{n}") for n in names}
     finders = {n: Finder(c, telemetry.seconds(c.usable.tai_ns)) for n, c in channels.items()}
-    return RecordedWheels(telemetry, craft, craft.at(telemetry.date_ns), finders, frozenset(run_down))
+    return RecordedWheels(telemetry, craft, craft.at(telemetry.date_ns), finders, spans)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .use import WheelUse
 
 RUN_DOWN, FLIGHT_SOFTWARE, COMMAND = "run-down", "flight software estimate", "command"
+MOTOR_CURRENT, WHEEL_COMMAND = "motor current", "wheel command"
 
 #: The split of drag into both parts is doubted where it is uncertain by this share of the drag.
 _SPLIT = 0.1
@@ -50,7 +51,7 @@ class DragRecord(TypedDict):
     drag_at_mean_sigma_Nm: Number
     mean_rate_rad_s: Annotated[Number, Doc("mean |rate| of the samples used")]
     separable: Annotated[bool | None, Doc("whether the split into both parts is known to 10 % of the drag")]
-    basis: Annotated[str | None, Doc("run-down, flight software estimate or command")]
+    basis: Annotated[str | None, Doc("run-down, flight software estimate, motor current, wheel command or command")]
     coulomb_per_spin_inertia_rad_s2: NotRequired[Number]
     coulomb_sigma_per_spin_inertia_rad_s2: NotRequired[Number]
     viscous_per_spin_inertia_per_s: NotRequired[Number]
@@ -66,7 +67,7 @@ class RunDownRecord(TypedDict):
     to_rad_s: Number
     samples: int
     rms_residual_rad_s: Number
-    found_by: Annotated[str, Doc("named (by the user) or shape")]
+    found_by: Annotated[str, Doc("named (by the user), current (the motor's is zero) or shape (guessed)")]
 
 
 class SpikeRecord(TypedDict):
@@ -214,6 +215,16 @@ class WheelDrag:
     @property
     def fit(self) -> DragFit | None:
         return self.fits[0] if self.fits else None
+
+    @property
+    def is_guessed(self) -> bool:
+        """Whether the drag is of run-downs that only their shape shows."""
+        return bool(self.run_downs) and all(r.is_guessed for r in self.run_downs)
+
+    @property
+    def known_fit(self) -> DragFit | None:
+        """The best way to the drag that is not guessed."""
+        return next((f for f in self.fits if not (f.basis == RUN_DOWN and self.is_guessed)), None)
 
     def record(self) -> dict:
         others = [f.record() for f in self.fits[1:]]

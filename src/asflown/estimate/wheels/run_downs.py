@@ -44,18 +44,27 @@ _STEEP = 50.0
 _FAR = 5.0
 
 
+#: How a run-down is known: the user names it, the motor's current is zero, or only a bearing explains its shape.
+NAMED, CURRENT, SHAPE = "named", "current", "shape"
+
+
 @dataclass(frozen=True)
 class RunDown:
-    """One stretch in which a wheel coasts.  ``named``: the user says so; else its shape does."""
+    """One stretch in which a wheel coasts.  ``found_by``: named (the user says so), current (the motor's is zero) or shape."""
 
     start_s: float
     stop_s: float
     from_rad_s: float
     to_rad_s: float
-    named: bool
+    found_by: str
     time_s: np.ndarray  # (N,), samples used
     rate_rad_s: np.ndarray  # (N,)
     fit_rad_s: np.ndarray  # (N,)
+
+    @property
+    def is_guessed(self) -> bool:
+        """Whether nothing but the shape says that the motor was off."""
+        return self.found_by == SHAPE
 
     def slowing_rad_s2(self, blocks: int = 16) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Mean rate, slowing of |rate| and its sigma in blocks, by straight lines: to look at, not to fit."""
@@ -77,7 +86,7 @@ class RunDown:
             "to_rad_s": self.to_rad_s,
             "samples": len(self.time_s),
             "rms_residual_rad_s": float(np.sqrt(np.mean((self.rate_rad_s - self.fit_rad_s) ** 2))),
-            "found_by": "named" if self.named else "shape",
+            "found_by": self.found_by,
         }
 
 
@@ -187,7 +196,7 @@ class Finder:
         self.t, self.rate = seconds, c.values
         self.quantum = channel.count_size or quantisation_step(c.values)
         self.gapless = c.segments()
-        self._fit = lru_cache(maxsize=None)(self._fitted)
+        self.fitted = lru_cache(maxsize=None)(self._fitted)
 
     def stretches(self) -> list[slice]:
         """Without a gap, turning one way, clear of stiction, long enough."""
@@ -208,7 +217,7 @@ class Finder:
 
     def obeys(self, a: int, b: int) -> bool:
         """Whether samples a..b follow the law of a coast to within their noise, or a bearing's own ways."""
-        p, _, _, r, noise = self._fit(a, b)
+        p, _, _, r, noise = self.fitted(a, b)
         fall = float(p.u[0] - r[0] - (p.u[-1] - r[-1]))
         sample = float(np.hypot(noise, self.quantum / np.sqrt(12)))
         if fall < _LEAST_FALL * sample or fall <= 1e-6 * abs(p.u[0]):
@@ -230,7 +239,7 @@ class Finder:
 
     def is_bearing(self, a: int, b: int) -> bool:
         """Whether the course is curved as viscous drag has it: a motor, or a steady torque, makes straight ones."""
-        p, x, inverse, r, noise = self._fit(a, b)
+        p, x, inverse, r, noise = self.fitted(a, b)
         total, freedom, _ = slow_misfit([p], [r], noise)
         scatter = max(float(np.std(r)), noise) * np.sqrt(max(total / freedom, 1.0))
         sigma_b = scatter * float(np.sqrt(inverse[1, 1]))
@@ -278,8 +287,8 @@ def _farthest(good, start: int, limit: int) -> int:
     return end
 
 
-def common_law(finder: Finder, spans: list[tuple[int, int]], *, named: bool) -> Coasting:
-    """One drag law for all run-downs of a wheel, each with a start rate of its own; ``named``: by the user."""
+def common_law(finder: Finder, spans: list[tuple[int, int]], found_by: str) -> Coasting:
+    """One drag law for all run-downs of a wheel, each with a start rate of its own."""
     parts = [finder.span(a, b) for a, b in spans]
     keep = [np.ones(len(p.s), bool) for p in parts]
     for _ in range(5):
@@ -300,7 +309,7 @@ def common_law(finder: Finder, spans: list[tuple[int, int]], *, named: bool) -> 
     for (a, b), p, k, m in zip(spans, parts, keep, x[2:], strict=True):
         fit = np.sign(finder.rate[a]) * coast(p.s, m, x[0], x[1])
         found.append(RunDown(
-            float(finder.t[a]), float(finder.t[b - 1]), float(fit[0]), float(fit[-1]), named,
+            float(finder.t[a]), float(finder.t[b - 1]), float(fit[0]), float(fit[-1]), found_by,
             finder.t[a:b][k], finder.rate[a:b][k], fit[k],
         ))  # fmt: skip
     rate = float(np.mean(np.concatenate([p.u for p in used])))

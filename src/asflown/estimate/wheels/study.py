@@ -14,9 +14,10 @@ import numpy as np
 from ...kit.doubts import Doubt, Doubts
 from ...kit.errors import BadInput
 from ...kit.result import recorded
-from .bases import NONE, coasting_of, from_command, from_flight_software, from_run_downs
+from .bases import NONE, coasting_of, from_command, from_flight_software, from_motor, from_run_downs
 from .causes import slowings
-from .doubts import BASES_DIFFER, DRAG_UNKNOWN, IN_GAPS, NEGATIVE_PART, NOT_SEPARABLE, OVER_LIMIT
+from .doubts import BASES_DIFFER, DRAG_UNKNOWN, IN_GAPS, NEGATIVE_PART, NONE_LISTED_HERE, NOT_SEPARABLE, OVER_LIMIT
+from .named import NamedRunDown, named_run_downs
 from .record import RecordedWheels, record_of
 from .result import DragFit, WheelDrag, WheelsResult
 from .run_downs import FEWEST, STICTION_RATE, Coasting
@@ -37,7 +38,11 @@ _APART = 4.0
 
 @recorded
 def wheels(
-    telemetry: Telemetry, craft: Craft, *, low_speed_rad_s: float = LOW_SPEED, run_down: Collection[str] = ()
+    telemetry: Telemetry,
+    craft: Craft,
+    *,
+    low_speed_rad_s: float = LOW_SPEED,
+    run_down: Collection[str | NamedRunDown] = (),
 ) -> WheelsResult:
     """Bearing drag of each wheel that has a rate, drag spikes, and how the wheel was used.
 
@@ -49,8 +54,10 @@ def wheels(
         The wheels' axes, spin inertia and rate limits.
     low_speed_rad_s : float
         Below it a wheel dwells [rad/s]; 300 rpm, which is assumed.
-    run_down : collection of str
-        Wheels whose motor is off in all of this telemetry; otherwise run-downs are those that only a bearing explains.
+    run_down : collection of str or NamedRunDown
+        When a wheel's motor is off: "RW1,RW2" in all of this telemetry, "RW3:60-240" from 60 to 240 s, or a CSV file with the
+        columns wheel, start, stop.  Otherwise run-downs are those in which its current is zero, or that only a bearing
+        explains: of n wheels, more than three, at most n - 3 at a time.
 
     Returns
     -------
@@ -66,8 +73,8 @@ def wheels(
     if not low_speed_rad_s > 0:
         raise BadInput(f"the low speed {low_speed_rad_s:g} rad/s is not positive", remedy='Give it as in "300 rpm".')
     record = record_of(telemetry, craft, run_down)
-    seen = slowings(record)
-    coastings, doubts = {}, [*telemetry.doubts]
+    seen, followers = slowings(record)
+    coastings, doubts = {}, [*telemetry.doubts, *_unlisted(record, run_down), *followers]
     for name in record.finders:
         coastings[name], found = coasting_of(record, name, seen[name])
         doubts += found
@@ -77,7 +84,7 @@ def wheels(
                 file=telemetry.source or None,
                 channel=f"wheel_rate_{name}",
                 remedy=f"A run-down takes {FEWEST} samples above {STICTION_RATE * 30 / np.pi:.0f} rpm without a gap. "
-                "Name its span with --start and --stop.",
+                'Name its span, as in "RW3:60-240".',
             )
     of_each = []
     for name in record.finders:
@@ -95,6 +102,12 @@ def wheels(
     )
 
 
+def _unlisted(record: RecordedWheels, run_down) -> list[Doubt]:
+    """Whether run-downs are named, but none in this telemetry."""
+    named = sorted({n.wheel for n in named_run_downs(run_down)})
+    return [NONE_LISTED_HERE(wheels=named)] if named and not record.run_down else []
+
+
 def _wheel(
     record: RecordedWheels, name: str, coastings: dict[str, Coasting | None], low_speed_rad_s: float
 ) -> tuple[WheelDrag, list[Doubt]]:
@@ -105,6 +118,10 @@ def _wheel(
         fit, found = from_run_downs(record, name, coasting)
         fits.append(fit)
         doubts += found
+    own = [] if coasting is None else [(r.start_s, r.stop_s) for r in coasting.run_downs]
+    of_motor, of_motor_found = from_motor(record, name, own)
+    fits += of_motor
+    doubts += of_motor_found
     spikes = samples = None
     if (software := from_flight_software(record, name)) is not None:
         fit, spikes, samples, found = software

@@ -11,20 +11,46 @@ from .of_record import record_entry
 if TYPE_CHECKING:
     from ...craft.model import Craft
     from ...estimate.wheels import WheelDrag, WheelsResult
+    from ...estimate.wheels.result import DragFit
     from ...telemetry.telemetry import Telemetry
 
 KIND = "wheels"
 _BASIS = "telemetry"
 
 
-def wheel_entry(result: WheelsResult, telemetry: Telemetry, craft: Craft, event_id: str | None = None) -> Entry:
-    """The entry of one record's wheels.  Raises BadInput for telemetry without an epoch."""
-    values = tuple(v for w in result.wheels for v in _values(w))
+def wheel_entry(
+    result: WheelsResult, telemetry: Telemetry, craft: Craft, event_id: str | None = None, *, guesses: bool = False
+) -> Entry:
+    """The entry of one record's wheels.
+
+    Parameters
+    ----------
+    result : WheelsResult
+        What was found of them.
+    telemetry : Telemetry
+        The record that it was found in.
+    craft : Craft
+        Whose wheels they are.
+    event_id : str, optional
+        Name of the entry; made from the date unless given.
+    guesses : bool
+        Whether to keep drag of run-downs that only their shape shows; without it, the best of the other ways is kept.
+
+    Returns
+    -------
+    Entry
+        Its doubts keep which wheel they are about, so that a verdict leaves out what is suspect.
+
+    Raises
+    ------
+    BadInput
+        For telemetry without an epoch.
+    """
+    values = tuple(v for w in result.wheels for v in _values(w, w.fit if guesses else w.known_fit))
     return record_entry(KIND, values, result.doubts, telemetry, craft, event_id, result.provenance)
 
 
-def _values(w: WheelDrag):
-    f = w.fit
+def _values(w: WheelDrag, f: DragFit | None):
     torque, per_rate = ("N m", "N m s")
     if f is not None and f.relative:
         torque, per_rate = "rad/s^2, per unit spin inertia", "1/s, per unit spin inertia"

@@ -1,0 +1,212 @@
+"""Any number of wheels: followers in the null space, named spans, motor current, and what a trend makes of them."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from asflown.craft.model import Wheel
+from asflown.estimate.wheels import wheels
+from asflown.estimate.wheels.doubts import (
+    CURRENT_ZERO,
+    FOLLOWS,
+    FOUND_BY_SHAPE,
+    MANY_COAST,
+    MISFIT,
+    NAMED_BUT_DRIVEN,
+    NONE_LISTED_HERE,
+    TORQUE_SCALE,
+)
+from asflown.estimate.wheels.named import NamedRunDown, named_run_downs
+from asflown.kit.errors import BadInput
+from asflown.trends.entries.wheels import wheel_entry
+from asflown.trends.entry import Entry, Value
+from asflown.trends.verdicts import DOUBTED, judge
+from cli.program import complaint, run
+from flights import CASSINI, telemetry_of
+from leo_wheels import DAYS, craft, craft_file, flown_day, table, truth
+
+WAYS = ("current", "shape", "named")
+
+
+def spans(day: int) -> tuple[str, ...]:
+    return tuple(f"RW{k}:{a:g}-{b:g}" for k, (a, b) in enumerate(truth(day)["coasting_s"], start=1))
+
+
+@cache
+def found(day: int, way: str):
+    return wheels(flown_day(day, way != "shape"), craft(), run_down=spans(day) if way == "named" else ())
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_recovery_of_every_wheels_drag_on_a_craft_with_four(way):
+    pulls = []
+    for day in DAYS:
+        told, result = truth(day), found(day, way)
+        for k, w in enumerate(result.wheels):
+            (r,) = w.run_downs
+            assert (w.fit.basis, r.found_by) == ("run-down", way)
+            assert told["coasting_s"][k][0] <= r.start_s < r.stop_s <= told["coasting_s"][k][1]
+            c, v = told["coulomb_Nm"][k], told["viscous_Nms"][k]
+            pulls.append(((w.fit.coulomb_Nm - c) / w.fit.coulomb_sigma_Nm, (w.fit.viscous_Nms - v) / w.fit.viscous_sigma_Nms))  # fmt: skip
+        assert result.doubts.has(FOUND_BY_SHAPE) == (way == "shape") and not result.doubts.has(MISFIT)
+    assert np.mean(np.abs(pulls) < 1.96) >= 0.9 and np.abs(pulls).max() < 3
+
+
+def test_recovery_of_drag_from_motor_current_in_the_loop():
+    pulls = []
+    for day in DAYS:
+        told = truth(day)
+        for k, w in enumerate(found(day, "current").wheels):
+            f = w.fits[1]
+            assert f.basis == "motor current" and f.separable
+            pulls.append(((f.coulomb_Nm - told["coulomb_Nm"][k]) / f.coulomb_sigma_Nm, (f.viscous_Nms - told["viscous_Nms"][k]) / f.viscous_sigma_Nms))  # fmt: skip
+    assert np.mean(np.abs(pulls) < 1.96) >= 0.88 and np.abs(pulls).max() < 4
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_recovery_of_a_month_in_which_one_wheel_ages(way):
+    entries = [wheel_entry(found(d, way), flown_day(d, way != "shape"), craft(), guesses=way == "shape") for d in DAYS]
+    health = judge(entries, kind="wheels")
+    grown = health.figure("coulomb_drag_RW3")
+    low, high = grown.trend.change_percent_ci95
+    assert low < 25 < high and grown.verdict == "watch"
+    assert {f.figure for f in health.figures if f.verdict != "pass"} == {"coulomb_drag_RW3"}
+
+
+# ---- motors of a craft made up here --------------------------------------------------------------------------
+
+
+def driven(seed, *, current=True, constant=0.05, J=0.02, coulomb=0.002, viscous=2e-5, bias=0.0):
+    """A wheel in a loop that works hard: its torque changes within a sample, and the rate and current are noisy."""
+    rng = np.random.default_rng(seed)
+    step, every = 0.25, 4
+    t = np.arange(0.0, 1200.0, step)
+    torque = 0.008 * np.sin(t / 60) + 0.002 * rng.standard_normal(len(t)) + coulomb + viscous * 100
+    w = np.empty(len(t))
+    w[0] = 100.0
+    for k in range(1, len(t)):
+        w[k] = w[k - 1] + step / J * (torque[k - 1] - coulomb * np.sign(w[k - 1]) - viscous * w[k - 1])
+    t, w, torque = t[::every], w[::every], torque[::every]
+    w = w + 0.005 * rng.standard_normal(len(t))
+    channel = {"wheel_current_RWA1": (t, torque / constant + bias + 1e-3 * rng.standard_normal(len(t)))}
+    return telemetry_of(wheel_rate_RWA1=(t, w), **(channel if current else {"wheel_torque_RWA1": (t, torque)}))
+
+
+def one_wheel(J=0.02, constant=0.05):
+    axis = CASSINI.wheels[0].axis
+    return CASSINI.model_copy(
+        update={
+            "wheels": (
+                CASSINI.wheels[0].model_copy(update={"spin_inertia": J, "axis": axis, "torque_constant": constant}),
+            )
+        }
+    )
+
+
+@pytest.mark.parametrize("current", [True, False])
+def test_recovery_pulls_of_motor_torque_are_unit_normal(current):
+    pulls = []
+    for seed in range(30):
+        f = wheels(driven(seed, current=current), one_wheel()).wheel("RWA1").fit
+        assert f.basis == ("motor current" if current else "wheel command")
+        total = 0.002 + 2e-5 * f.mean_rate_rad_s
+        pulls.append(((f.coulomb_Nm - 0.002) / f.coulomb_sigma_Nm, (f.viscous_Nms - 2e-5) / f.viscous_sigma_Nms, (f.drag_at_mean_Nm - total) / f.drag_at_mean_sigma_Nm))  # fmt: skip
+    assert np.abs(np.mean(pulls, axis=0)).max() < 0.7 and np.std(pulls) < 1.4 and np.abs(pulls).max() < 4
+
+
+def test_a_wrong_torque_constant_is_doubted():
+    result = wheels(driven(1), one_wheel(constant=0.06))
+    assert result.doubts.about(wheel="RWA1").has(TORQUE_SCALE)
+    assert not wheels(driven(1), one_wheel()).doubts.has(TORQUE_SCALE)
+    assert wheels(driven(1), one_wheel()).doubts.has(CURRENT_ZERO)
+
+
+def four(noise):
+    """One of four wheels coasts, and the others follow exactly but for what the controller adds."""
+    rng = np.random.default_rng(5)
+    t = np.arange(0.0, 400.0, 1.0)
+    J, c, v = 0.01, 0.001, 1e-5
+    u = (150 + c / v) * np.exp(-v * t / J) - c / v
+    way = np.array([1, -1, 1, -1])
+    channels = {}
+    for k in range(4):
+        wander = np.convolve(rng.standard_normal(len(t) + 20), np.ones(20) / 20, "same")[:400]
+        # a follower's own momentum was another one: it coasts by the law of the other
+        own = way[k] * (u + 10.0 * k) + (noise * wander if k else 0.0)
+        channels[f"wheel_rate_W{k + 1}"] = (t, own + 0.003 * rng.standard_normal(len(t)))
+    s = 1 / np.sqrt(3)
+    axes = [(s, s, s), (-s, s, s), (-s, -s, s), (s, -s, s)]
+    made = tuple(Wheel.model_construct(**{**CASSINI.wheels[0].__dict__, "name": f"W{k + 1}", "axis": a, "spin_inertia": J}) for k, a in enumerate(axes))  # fmt: skip
+    return telemetry_of(**channels), CASSINI.model_copy(update={"wheels": made})
+
+
+def test_law_at_most_one_of_four_wheels_coasts_and_it_is_the_smoothest():
+    telemetry, four_wheels = four(0.05)
+    result = wheels(telemetry, four_wheels)
+    assert [w.name for w in result.wheels if w.run_downs] == ["W1"] and result.doubts.has(FOLLOWS)
+    assert result.wheel("W1").fit.coulomb_Nm == pytest.approx(0.001, rel=0.02)
+
+
+def test_law_of_equal_courses_none_is_taken():
+    result = wheels(*four(0.0))
+    assert not any(w.run_downs for w in result.wheels) and result.doubts.has(MANY_COAST)
+
+
+def test_law_a_named_span_excludes_the_finds_of_others():
+    telemetry, four_wheels = four(0.0)
+    result = wheels(telemetry, four_wheels, run_down=("W2:10-390",))
+    assert [w.name for w in result.wheels if w.run_downs] == ["W2"]
+    (r,) = result.wheel("W2").run_downs
+    assert (r.found_by, r.start_s, r.stop_s) == ("named", 10.0, 390.0)
+
+
+def test_a_named_wheel_whose_motor_works_is_doubted():
+    t = np.arange(0.0, 600.0, 1.0)
+    w, current = 200 - 0.1 * t, np.full(len(t), -0.02)
+    craft_ = one_wheel()
+    result = wheels(telemetry_of(wheel_rate_RWA1=(t, w), wheel_current_RWA1=(t, current)), craft_, run_down=("RWA1:50-550",))  # fmt: skip
+    assert result.doubts.has(NAMED_BUT_DRIVEN)
+
+
+# ---- words and verb --------------------------------------------------------------------------------------------
+
+
+def test_run_downs_are_named_in_three_forms(tmp_path):
+    listed = tmp_path / "list.csv"
+    listed.write_text("wheel,start,stop\nRW3,60,240\nRW1,2026-04-01T06:00:00,2026-04-01T06:01:00\n")
+    named = named_run_downs(["RW1, RW2", "RW3:60-240", str(listed)])
+    assert named[:3] == (NamedRunDown("RW1"), NamedRunDown("RW2"), NamedRunDown("RW3", 60.0, 240.0))
+    assert named[3:] == (NamedRunDown("RW3", "60", "240"), NamedRunDown("RW1", "2026-04-01T06:00:00", "2026-04-01T06:01:00"))  # fmt: skip
+    broken = tmp_path / "broken.csv"
+    broken.write_text("wheel,start\nRW3,60\n")
+    for word in ("", "RW3:60", "RW3:240-60", "RW3:a-b", "RW3:1.2.3-4", str(tmp_path / "none.csv"), str(broken)):
+        with pytest.raises(BadInput):
+            named_run_downs([word])
+    t = np.arange(0.0, 400.0, 4.0)
+    away = wheels(telemetry_of(wheel_rate_RWA1=(t, 50 + 0 * t)), CASSINI, run_down=("RWA1:5000-6000",))
+    assert away.doubts.has(NONE_LISTED_HERE)
+
+
+def test_the_verb_keeps_what_is_known(tmp_path):
+    path, dictionary = table(1, current=False)
+    words = ["wheels", path, "--channels", dictionary, "--craft", craft_file(), "--store", tmp_path / "s.db"]
+    guessed = run(*words)
+    assert guessed.code == 0 and "only guessed: drag of RW1, RW2, RW3, RW4" in guessed.err
+    for more in (["--store-guesses"], [w for s in spans(1) for w in ("--run-down", s)]):
+        done = run(*words, *more)
+        assert done.code == 0 and "guessed" not in done.err and "kept as" in done.err
+    complaint(*words, "--run-down", "RW3:60")
+
+
+def test_figures_with_suspect_doubts_are_shown_and_not_judged():
+    entries = []
+    for k in range(10):
+        values = [Value(f"coulomb_drag_{w}", "telemetry", 0.001 * (1 + 0.05 * k), 1e-6, "N m") for w in ("W1", "W2")]
+        doubts = [MISFIT(wheel="W1", ratio=5.0)] if k > 1 else []
+        entries.append(Entry("any", f"e{k}", "wheels", f"2026-04-{k + 1:02d}T00:00:00", values=tuple(values), doubts=doubts))  # fmt: skip
+    health = judge(entries, kind="wheels")
+    doubted, sound = health.figure("coulomb_drag_W1"), health.figure("coulomb_drag_W2")
+    assert (len(doubted.rows), len(doubted.doubted), doubted.verdict) == (2, 8, "pass")
+    assert (len(sound.rows), len(sound.doubted), sound.verdict) == (10, 0, "watch")
+    assert health.doubts.has(DOUBTED)
