@@ -102,6 +102,10 @@ def command_of(
     pushed = gyroscopic if law.acceleration is None else law.acceleration
     feed = gyroscopic * turn + pushed * push
     fed = gyroscopic * cumulative_trapezoid(turn, at, axis=0, initial=0) + pushed * (rate - rate[0]) @ I_B
+    for j, of_axis in series.items():
+        more = _beside(of_axis, fed[:, j], at, I_B[j, j] * law.kd_per_s, law)
+        feed[:, j], fed[:, j] = feed[:, j] + more.at(at, 1), fed[:, j] + more.at(at, 0)
+        variance[1, j] += more.variance[0] / I_B[j, j] ** 2
     return Command(at, rate, acceleration, feed, fed, variance, source, gyroscopic, pushed)
 
 
@@ -119,9 +123,7 @@ def _commanded(subject: Subject, grid: Grid, series, law: WheelController):
         inside = np.clip(at, middle[0], middle[-1])
         rate = np.column_stack([f(inside) for f in smooth])
         return rate, np.column_stack([f.derivative()(inside) for f in smooth]), np.zeros((2, 3)), "commanded attitude"
-    spacing = max(_SMOOTHED_S, _LOOP_TIMES / law.natural_frequency_rad_s)
-    most = max(1, round(float(at[-1]) / spacing))
-    block_s = max(_BLOCK_S, 2 / law.natural_frequency_rad_s)
+    most, block_s = _smoothing(law, at)
     measured = [next(s for s in series[j] if s.row == BODY_RATE) for j in range(3)]
     fits = [_smoothed(s.seconds, ndimage.median_filter(s.values, 5), 0, most, block_s) for s in measured]
     found = [np.column_stack([f.at(at, k) for f in fits]) for k in (0, 1)]
@@ -189,6 +191,25 @@ def _smoothed(seconds: np.ndarray, values: np.ndarray, order: int, most: int, bl
     # of a least-squares line, and of a parabola
     slope, curve = 12 * each / span**2, 720 * each / span**4
     return _Smooth(spline, (slope, curve) if order else (each, slope))
+
+
+def _beside(of_axis: list[Series], fed: np.ndarray, at: np.ndarray, gain: float, law: WheelController) -> _Smooth:
+    """What the actuators slowly do beside the law and its feed-forward: the integral of that torque on the body.
+
+    Bearing drag, a bias of the rate sensor, an inertia on board that is another: all shift the attitude held, and would be
+    taken for a disturbance.  ``fed``: integral of the feed-forward; ``gain``: inertia x KD."""
+    row = {s.row: s for s in of_axis}
+    h, e = row[MOMENTUM], row[ATTITUDE_ERROR]
+    turned = cumulative_trapezoid(e.values, e.seconds, initial=0)
+    asked = gain * (law.kp_per_s * np.interp(h.seconds, e.seconds, turned) + np.interp(h.seconds, e.seconds, e.values))
+    left = -h.values - asked - np.interp(h.seconds, at, fed)
+    return _smoothed(h.seconds, left, 1, *_smoothing(law, at))
+
+
+def _smoothing(law: WheelController, at: np.ndarray) -> tuple[int, float]:
+    """Most pieces of a slow spline, and the blocks that it takes the means of [s]."""
+    spacing = max(_SMOOTHED_S, _LOOP_TIMES / law.natural_frequency_rad_s)
+    return max(1, round(float(at[-1]) / spacing)), max(_BLOCK_S, 2 / law.natural_frequency_rad_s)
 
 
 def _fed_forward(law: WheelController, I_B: np.ndarray, series, turn: np.ndarray) -> bool:
