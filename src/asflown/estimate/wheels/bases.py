@@ -26,8 +26,8 @@ from .samples import find_spikes, opposing
 
 if TYPE_CHECKING:
     from ...kit.doubts import Doubt
-    from .causes import Slowing
     from .record import RecordedWheels
+    from .slowing import Slowing
 
 #: Length over which commanded torque and momentum gained are compared [s], and how many of them it takes.
 _BLOCK_S, _FEWEST_BLOCKS = 60.0, 6

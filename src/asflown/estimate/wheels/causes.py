@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import chi2
@@ -10,7 +10,8 @@ from scipy.stats import chi2
 from ...telemetry.channels import AXES
 from .doubts import MOTOR_AT_WORK, SLOWS_AS_DRIVEN, SLOWS_BY_COMMAND, SLOWS_WITH_OTHERS
 from .rivals import without_followers
-from .run_downs import CURRENT, FEWEST, SHAPE
+from .run_downs import CURRENT, FEWEST
+from .slowing import Slowing
 
 if TYPE_CHECKING:
     from ...kit.doubts import Doubt, Kind
@@ -32,17 +33,6 @@ _QUIET = 0.25
 _LOUD = 0.5
 #: Share of a slowing that the commanded torque explains: above it the motor is at work.
 _COMMANDED = 0.5
-
-
-class Slowing(NamedTuple):
-    """Samples ``first`` to before ``end`` of a wheel, in which it slows steadily; ``cause``: None where only a bearing explains it.
-
-    ``found_by``: its shape, or that its motor's current is zero."""
-
-    first: int
-    end: int
-    cause: Kind | None
-    found_by: str = SHAPE
 
 
 def slowings(record: RecordedWheels) -> tuple[dict[str, list[Slowing]], list[Doubt]]:

@@ -17,9 +17,9 @@ from .run_downs import CURRENT, FEWEST
 
 if TYPE_CHECKING:
     from ...kit.doubts import Doubt
-    from .causes import Slowing
     from .record import RecordedWheels
     from .run_downs import Finder
+    from .slowing import Slowing
 
 #: Wheels that hold an attitude.
 HOLDING = 3

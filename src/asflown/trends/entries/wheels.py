@@ -10,8 +10,7 @@ from .of_record import record_entry
 
 if TYPE_CHECKING:
     from ...craft.model import Craft
-    from ...estimate.wheels import WheelDrag, WheelsResult
-    from ...estimate.wheels.result import DragFit
+    from ...estimate.wheels import DragFit, WheelDrag, WheelsResult
     from ...telemetry.telemetry import Telemetry
 
 KIND = "wheels"
