@@ -40,7 +40,8 @@ def run(*words, craft: str | None = "cassini") -> Run:
     verbs = {" ".join(argv[1:2]), " ".join(argv[1:3])}
     bare = "--craft" in argv or "--help" in argv or verbs.intersection(NEED_NONE) or len(argv) == 2
     if craft is not None and not bare and verbs.intersection(NEED_CRAFT):
-        argv += ["--craft", craft]
+        words_of_verb = 3 if argv[2] in ("add", "plan", "history", "fit") else 2
+        argv[words_of_verb:words_of_verb] = ["--craft", craft]  # before what may lack its value
     code: object = 0
     with patch.object(sys, "argv", argv), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:

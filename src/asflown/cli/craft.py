@@ -1,6 +1,8 @@
-"""Crafts: list the built-in ones, show one on a date, check a file of your own."""
+"""Crafts: list the built-in ones, show one on a date, start a file of your own, check it."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import typer
 
@@ -87,20 +89,69 @@ def _by_timing(thrusters) -> dict[str, list[str]]:
     return found
 
 
+@app.command(short_help="Start a craft file of your own.")
+def new(
+    name: str = typer.Argument(help="The craft's name; its file is NAME.toml in the working folder."),
+    wheels: int = typer.Option(None, "--wheels", help="How many wheels (default: 3 along x, y, z)."),
+    cant: str = typer.Option(
+        None, "--cant", help='Angle of their axes above the x-y plane, evenly around z, as in "35.26deg".'
+    ),
+    from_json: Path = typer.Option(
+        None, "--from-json", help="Inertia and wheels from a JSON file, with the keys of craft show --json."
+    ),
+    json: bool = JSON,
+) -> None:
+    """Write a commented template of a craft file, which passes craft check; fill in your own values."""
+    from ..craft.load import load_craft
+    from ..craft.template import craft_template, outline, outline_of
+    from ..kit.doubts import Doubts
+    from ..kit.errors import BadInput
+    from ..kit.files import write_text
+    from ..kit.quantities import quantity
+
+    if not name.replace("-", "").replace("_", "").isalnum():
+        raise BadInput(f"{name!r} is no name for a craft", remedy="Use letters, digits, - and _.")
+    if from_json is not None and (wheels is not None or cant is not None):
+        raise BadInput("--from-json has the wheels already", remedy="Leave out --wheels and --cant.")
+    angle = None if cant is None else quantity(cant, "rad")
+    what = outline(3 if wheels is None else wheels, angle) if from_json is None else outline_of(from_json)
+    place = Path(f"{name}.toml")
+    if place.exists():
+        raise BadInput("there is such a file already", file=place, remedy="Choose another name, or remove it first.")
+    write_text(place, craft_template(name, what))
+    try:
+        doubts = Doubts(load_craft(place).at(None).doubts)
+    except BadInput:
+        place.unlink()
+        raise
+    if json:
+        options = {"name": name, "wheels": wheels, "cant": cant, "from_json": from_json}
+        print_json({"command": "craft new", "craft": name, "file": str(place), **doubts.record(),
+                    "provenance": provenance(hashes(from_json), options)})  # fmt: skip
+        return
+    print(f"wrote {place}: fill in your own values, then run `asflown craft check {place}`")
+    print_doubts(doubts)
+
+
 @app.command(short_help="Check a craft file.")
 def check(file: str = typer.Argument(help="A craft TOML file."), json: bool = JSON) -> None:
-    """Check a craft file, and report its first error."""
+    """Check a craft file: report its errors, else say verb by verb what it allows and what is missing."""
+    from ..craft.abilities import abilities
     from ..craft.load import load_craft
 
     c = load_craft(file)
-    now = c.at(None)
+    now, can = c.at(None), abilities(c)
     if json:
         print_json(
-            _record(c, now, None) | {"command": "craft check", "provenance": provenance(hashes(file), {"craft": file})}
+            _record(c, now, None)
+            | {"verbs": [a._asdict() for a in can], "command": "craft check"}
+            | {"provenance": provenance(hashes(file), {"craft": file})}
         )
         return
     print(f"{file}: a valid craft ({c.name}; wheels: {len(c.wheel_names)}, thrusters: {len(c.thrusters)}, "
           f"mass properties: {len(c.mass_properties)})")  # fmt: skip
+    for a in can:
+        print(wrapped(f"  {a.verb:16s} {'yes' if a.can else 'no ':3s}  ", a.note).rstrip())
     print_doubts(now.doubts)
 
 

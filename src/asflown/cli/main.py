@@ -50,7 +50,7 @@ app.add_typer(inertia.app, name="inertia", short_help="The inertia tensor and th
 app.add_typer(trend.app, name="trend", short_help="An actuator's health over years: add, list, show, compare, watch.")
 app.add_typer(gates.app, name="gates", short_help="Maneuver execution errors: fit, judge, watch, predict.")
 app.add_typer(telemetry.app, name="telemetry", short_help="Check a telemetry file; list channel names.")
-app.add_typer(craft.app, name="craft", short_help="List, show and check crafts.")
+app.add_typer(craft.app, name="craft", short_help="List, show, start and check crafts.")
 
 
 @app.callback(invoke_without_command=True)

@@ -102,6 +102,21 @@ class CraftRecord(TypedDict):
     center_of_mass_assumed_m: Vector | None
 
 
+class AbilityRecord(TypedDict):
+    verb: str
+    can: bool
+    note: Annotated[str, Doc("what is missing, or what an answer rests on")]
+
+
+class CraftCheckRecord(CraftRecord):
+    verbs: list[AbilityRecord]
+
+
+class CraftNewRecord(TypedDict):
+    craft: str
+    file: str
+
+
 # ---- simulate ----
 
 
