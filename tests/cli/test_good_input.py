@@ -263,7 +263,7 @@ def test_help_version_and_no_arguments():
 
 
 def test_output_into_a_closed_pipe_is_no_error(good):
-    program = f"{sys.executable} -c 'from asflown.cli.main import main; main()' torque {good} --json | head -c 10"
+    program = f"{sys.executable} -c 'from asflown.cli.main import main; main()' torque {good} --craft cassini --json | head -c 10"
     done = subprocess.run(["bash", "-c", program], capture_output=True, text=True, check=False)
     assert done.stdout == json.dumps({"command": "torque"})[:10] and done.stderr == ""
 
