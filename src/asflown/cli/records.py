@@ -186,6 +186,7 @@ class FigureRecord(TypedDict):
     basis: str
     unit: str
     rows: list[ValueRowRecord]
+    doubted_rows: Annotated[list[ValueRowRecord], Doc("shown, not judged: a suspect or void doubt concerns them")]
     change_percent: Number
     change_percent_ci95: Interval | None
     p_value: Number

@@ -11,7 +11,7 @@ from ...telemetry.channels import AXES
 from .series import BODY_RATE, white_noise
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from .series import Series
 
@@ -37,7 +37,7 @@ class CommandNotKnown(Exception):
 
 
 def check_turn(
-    series: dict[int, Sequence[Series]],
+    series: Mapping[int, Sequence[Series]],
     modelled: np.ndarray,
     I_B: np.ndarray,
     stored_Nms: np.ndarray,

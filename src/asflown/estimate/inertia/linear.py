@@ -224,8 +224,9 @@ def _wheel_rows(about: Reference, states: States, frame: str, seen: np.ndarray) 
     R = rotation(motion.q_NB).as_matrix()
     d, I_B = m.direction, about.tensor
     grown = grown_by(motion.time_s, R, frame)
-    if layout.levers:
-        grown = np.concatenate([grown, about.record.surroundings.grown(motion.time_s, R)], axis=2)
+    around = about.record.surroundings
+    if layout.levers and around is not None:
+        grown = np.concatenate([grown, around.grown(motion.time_s, R)], axis=2)
     added = grown @ beta[layout.pushes]
     gravity = about.record.grown_by_gravity(motion.time_s, R)
     if gravity is not None:

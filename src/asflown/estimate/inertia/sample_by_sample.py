@@ -72,7 +72,8 @@ def rows_of(record: SlewRecord) -> Rows:
     times, h, arc = times[whole], h[whole], arc[whole]
     motion = first_motion(record, times)
     R = rotation(motion.q_NB).as_matrix()
-    levers = record.surroundings.grown(times, R) if record.levers else np.empty((len(times), 3, 0))
+    around = record.surroundings
+    levers = around.grown(times, R) if record.levers and around is not None else np.empty((len(times), 3, 0))
     columns = record.tensor_columns(times, R, motion.omega_B)
     return Rows(times, h, motion, arc, columns, record.grown_by_gravity(times, R), levers)
 
@@ -215,6 +216,7 @@ def _plain_elements(rows: Rows) -> np.ndarray:
 
 def _brought(rows: Rows, here: np.ndarray) -> np.ndarray:
     """Momentum that the gravity gradient has brought since the reading before a slew, per unit of each element, body axes. (n, 3, 6)"""
+    assert rows.gravity is not None  # asked for only where there is an orbit
     since = rows.gravity[here] - rows.gravity[here[0] - _BEFORE : here[0]].mean(axis=0)
     return np.swapaxes(rotation(rows.motion.q_NB[here]).as_matrix(), 1, 2) @ since
 
