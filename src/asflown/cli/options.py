@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import typer
 
 CRAFT = typer.Option(
@@ -67,24 +65,6 @@ def numbers_of(text: str, option: str) -> list[float]:
 
 def hashes(*files) -> dict[str, str]:
     """SHA-256 of every file named, for the provenance; anything else (a built-in name, None) is skipped."""
-    from ..kit.files import sha256_of
+    from ..kit.result import inputs_of
 
-    return {str(f): sha256_of(Path(f).read_bytes()) for f in files if f is not None and Path(f).is_file()}
-
-
-def telemetry_from(file: Path, channels, exclude, start, stop, craft):
-    """Telemetry, screened and cut to the window.  Returns it and the inputs' SHA-256."""
-    from ..telemetry.load import load_telemetry
-
-    whole = load_telemetry(file, channels=channels, exclude=exclude, craft=craft)
-    return whole.between(start, stop), {whole.source: whole.sha256} | hashes(channels, exclude)
-
-
-def check_picture(place: Path | None) -> None:
-    """Check before the work that a picture can be written there (None: no picture)."""
-    if place is not None:
-        from ..kit.files import check_place
-        from ..plots.figure import picture_kind
-
-        check_place(place)
-        picture_kind(place)
+    return dict(inputs_of(*files))

@@ -29,15 +29,6 @@ def say(text: str = "") -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def keep(store: str, entry) -> None:
-    """Store an entry in a trend store, and report its name and revision."""
-    from ..trends.store import TrendStore
-
-    with TrendStore.open(store) as trends:
-        kept = trends.add(entry)[0]
-    say(f"stored as {kept.event}, revision {kept.revision}")
-
-
 def progress():
     """``say`` on a terminal; None where standard error is redirected, so that it has errors only."""
     return say if sys.stderr.isatty() else None

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from .options import CHANNELS, CM, EXCLUDE, INERTIA, JSON, START, STOP, craft_from, hashes, telemetry_from
+from .options import CHANNELS, CM, EXCLUDE, INERTIA, JSON, START, STOP, craft_from, hashes
 from .output import print_doubts, print_json, provenance
 
 app = typer.Typer(help=__doc__, rich_markup_mode=None)
@@ -29,17 +29,18 @@ def check(
     Exit code 3 where the data need inspection before use: a doubted unit, spikes, a stuck sensor, an
     undeclared wrap, quaternions without unit length, one time stamp with two different values.
     Dropouts, gaps, repeats, duplicates and late samples are reported and handled, exit code 0."""
+    from ..telemetry.load import load_telemetry
     from ..telemetry.screening import needs_a_look, summaries
 
     ship = craft_from(craft, inertia, cm) if craft else None
-    t, inputs = telemetry_from(file, channels, exclude, start, stop, ship)
+    t = load_telemetry(file, channels=channels, exclude=exclude, craft=ship).between(start, stop)
     lines = summaries(t)
     if json:
         options = {"channels": channels, "exclude": exclude, "craft": craft, "inertia": inertia, "cm": cm, "start": start,
                    "stop": stop}  # fmt: skip
         print_json(
             _record(t, lines)
-            | {"command": "telemetry check", "provenance": provenance(inputs | hashes(craft), options)}
+            | {"command": "telemetry check", "provenance": provenance(dict(t.inputs) | hashes(craft), options)}
         )
     else:
         _print(t, lines)
