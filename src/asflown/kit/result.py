@@ -208,7 +208,8 @@ class Estimate:
 
     def _save_csv(self, path) -> None:
         """Comment lines, a heading with units, and rows; blank where unknown.  No partial file remains."""
-        columns = _flat(self._needed_series())
+        series = self._needed_series()
+        columns = _flat(series)
         lines = [
             f"# epoch: {self.epoch}",
             f"# {type(self).__name__}; craft {self.craft}; {self.method}, {self.variant}",
@@ -217,7 +218,7 @@ class Estimate:
         lines += [f"# input {i.file} sha256 {i.sha256}" for i in self.inputs]
         lines.append(f"# asflown {version('asflown')}, options {plain(self.options)}")
         lines.append(",".join(["time_s", *columns]))
-        rows = zip(self._needed_series().time_s, *columns.values(), strict=True)
+        rows = zip(series.time_s, *columns.values(), strict=True)
         lines.extend(",".join("" if v != v else repr(float(v)) for v in row) for row in rows)
         write_text(path, "\n".join(lines) + "\n")
 
