@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import asflown
-import leo_torque as leo
+import leo
 from asflown.dynamics.loop import denominator, filtered_rate
 from asflown.estimate.fused.body import AxisData
 from asflown.estimate.fused.held_body import HeldBody, LoopLevels
@@ -39,7 +39,9 @@ def test_recovery_nadir_hold_with_the_controller_described(tmp_path, controller)
 
 
 def test_recovery_nadir_hold_with_the_commanded_rate(tmp_path):
-    r = asflown.torque(leo.record(tmp_path, stop_s=600, commanded=_nadir), leo.craft(tmp_path))
+    r = asflown.torque(
+        leo.record(tmp_path, stop_s=600, commanded=_nadir), leo.craft(tmp_path, controller=leo.CONTROLLER)
+    )
     assert r.settings["command"] == "commanded rate"
     assert not r.doubts.has(COMMAND_SMOOTHED)
     _held(r)
@@ -52,7 +54,7 @@ def test_recovery_nadir_hold_without_the_controller(tmp_path):
 
 
 def test_law_a_craft_file_needs_no_rate_filter(tmp_path):
-    law = leo.craft(tmp_path).wheel_controller
+    law = leo.craft(tmp_path, controller=leo.CONTROLLER).wheel_controller
     assert law.rate_filter is None
     assert law.period is None
     assert denominator(law) == pytest.approx([1, law.kd_per_s, law.kp_per_s * law.kd_per_s])

@@ -12,12 +12,12 @@ from asflown.estimate.inertia import consistent, gravity, record, tensor
 from asflown.estimate.inertia.linear import _slow_torque
 from asflown.estimate.inertia.tensor import inertia
 from flights import changed, without
-from leo_inertia import kestrel, slews, told_and_truth
+from leo import craft, said, slews
 
 
 def of(name, tmp_path, method="consistent", change=lambda tlm: tlm):
-    result = inertia(change(slews(name)), kestrel(tmp_path, name), method=method)
-    return result, elements_of(result.inertia_kgm2 - np.array(told_and_truth(name)["truth"]["inertia_kgm2"]))
+    result = inertia(change(slews(name)), craft(tmp_path, name, inertia="predicted"), method=method)
+    return result, elements_of(result.inertia_kgm2 - np.array(said(name)["truth"]["inertia_kgm2"]))
 
 
 def flown(mu, radius_m, span_s=1200.0, scale=1.0):

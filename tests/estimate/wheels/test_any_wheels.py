@@ -24,25 +24,25 @@ from asflown.trends.entry import Entry, Value
 from asflown.trends.verdicts import DOUBTED, judge
 from cli.program import complaint, run
 from flights import CASSINI, telemetry_of
-from leo_wheels import DAYS, craft, craft_file, flown_day, table, truth
+from leo import DAYS, flown_day, run_downs, said, table, wheel_craft, wheel_craft_file
 
 WAYS = ("current", "shape", "named")
 
 
 def spans(day: int) -> tuple[str, ...]:
-    return tuple(f"RW{k}:{a:g}-{b:g}" for k, (a, b) in enumerate(truth(day)["coasting_s"], start=1))
+    return tuple(f"RW{k}:{a:g}-{b:g}" for k, (a, b) in enumerate(said(run_downs(day))["truth"]["coasting_s"], start=1))
 
 
 @cache
 def found(day: int, way: str):
-    return wheels(flown_day(day, way != "shape"), craft(), run_down=spans(day) if way == "named" else ())
+    return wheels(flown_day(day, way != "shape"), wheel_craft(), run_down=spans(day) if way == "named" else ())
 
 
 @pytest.mark.parametrize("way", WAYS)
 def test_recovery_of_every_wheels_drag_on_a_craft_with_four(way):
     pulls = []
     for day in DAYS:
-        told, result = truth(day), found(day, way)
+        told, result = said(run_downs(day))["truth"], found(day, way)
         for k, w in enumerate(result.wheels):
             (r,) = w.run_downs
             assert (w.fit.basis, r.found_by) == ("run-down", way)
@@ -56,7 +56,7 @@ def test_recovery_of_every_wheels_drag_on_a_craft_with_four(way):
 def test_recovery_of_drag_from_motor_current_in_the_loop():
     pulls = []
     for day in DAYS:
-        told = truth(day)
+        told = said(run_downs(day))["truth"]
         for k, w in enumerate(found(day, "current").wheels):
             f = w.fits[1]
             assert f.basis == "motor current" and f.separable
@@ -66,7 +66,9 @@ def test_recovery_of_drag_from_motor_current_in_the_loop():
 
 @pytest.mark.parametrize("way", WAYS)
 def test_recovery_of_a_month_in_which_one_wheel_ages(way):
-    entries = [wheel_entry(found(d, way), flown_day(d, way != "shape"), craft(), guesses=way == "shape") for d in DAYS]
+    entries = [
+        wheel_entry(found(d, way), flown_day(d, way != "shape"), wheel_craft(), guesses=way == "shape") for d in DAYS
+    ]
     health = judge(entries, kind="wheels")
     grown = health.figure("coulomb_drag_RW3")
     low, high = grown.trend.change_percent_ci95
@@ -190,7 +192,7 @@ def test_run_downs_are_named_in_three_forms(tmp_path):
 
 def test_the_verb_keeps_what_is_known(tmp_path):
     path, dictionary = table(1, current=False)
-    words = ["wheels", path, "--channels", dictionary, "--craft", craft_file(), "--store", tmp_path / "s.db"]
+    words = ["wheels", path, "--channels", dictionary, "--craft", wheel_craft_file(), "--store", tmp_path / "s.db"]
     guessed = run(*words)
     assert guessed.code == 0 and "only guessed: drag of RW1, RW2, RW3, RW4" in guessed.err
     for more in (["--store-guesses"], [w for s in spans(1) for w in ("--run-down", s)]):
