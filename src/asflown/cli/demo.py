@@ -49,15 +49,17 @@ def demo(
     mission = _mission(folder / "mission", craft)
 
     def text() -> None:
-        print("\n\n".join(map(str, [*map(profile_table, tables), _mission_table(mission)])))
+        print("\n\n".join(map(str, [*map(profile_table, tables), cover.table("cover-deploy")])))
+
+    def verdict() -> None:
+        say(f"figures and telemetry: {folder}/")
+        print(f"\n{_mission_table(mission)}")
         for reason in mission["reasons"]:
             print(wrapped("  ", reason))
         print(f"report: {mission['report']}\nverdict: {mission['verdict']}")
-        say(f"figures and telemetry: {folder}/")
-        print(f"\n{cover.table('cover-deploy')}")  # last: the doubts that follow are its
 
     record = {"tables": tables, "cover": cover.record() | doubts.record(), "mission": mission, "out": str(folder)}
-    job.tell(record, doubts, text, options={"out": str(folder)}, seed=SEED)
+    job.tell(record, doubts, text, last=verdict, options={"out": str(folder)}, seed=SEED)
 
 
 def _profile(name: str, folder: Path, craft: Craft, step: Callable[[str], None]) -> dict:

@@ -128,20 +128,38 @@ class Job:
             raise typer.Exit(3)
 
     def tell(
-        self, record: dict, doubts: Doubts, text: Callable[[], None], *, inputs=(), options=None, seed=None
+        self,
+        record: dict,
+        doubts: Doubts,
+        text: Callable[[], None],
+        *,
+        last: Callable[[], None] = lambda: None,
+        inputs=(),
+        options=None,
+        seed=None,
     ) -> None:
-        """The end of a verb whose result is no estimate: its ``record`` with doubts and provenance as JSON, or its text."""
+        """The end of a verb whose result is no estimate: its ``record`` with doubts and provenance as JSON, or its text.
+
+        ``last``: prints what comes after the doubts."""
         from ..kit.result import provenance
 
         told = provenance((*inputs, *Defaults.used), self.options | (options or {}), seed)
-        self._tell(record | doubts.record(), told, doubts, text)
+        self._tell(record | doubts.record(), told, doubts, text, last)
 
-    def _tell(self, record: dict, provenance: dict, doubts: Doubts, text: Callable[[], None]) -> None:
+    def _tell(
+        self,
+        record: dict,
+        provenance: dict,
+        doubts: Doubts,
+        text: Callable[[], None],
+        last: Callable[[], None] = lambda: None,
+    ) -> None:
         if self.given.get("json"):
             print_json({"command": self.verb} | record | {"provenance": provenance})
         else:
             text()
             print_doubts(doubts)
+            last()
 
     def _write(self, result: Estimate, figures) -> None:
         out, plot, plot_dir = (self.given.get(n) for n in ("out", "plot", "plot_dir"))
