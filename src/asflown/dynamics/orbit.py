@@ -1,15 +1,26 @@
-"""An orbit as a table of positions: which body it is about, told from its own acceleration, and where the craft is between rows."""
+"""An orbit: as a table of positions (which body it is about, and where the craft is between rows), or flown from a state or elements."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
 
+from ..kit.errors import BadInput
 from ..kit.scatter import difference_sigma
+from ..kit.timeline import NS, utc_label
 from .environment import MU_EARTH
+
+if TYPE_CHECKING:
+    from ..craft.surroundings import OrbitElements
+
+#: Equatorial radius of the Earth (WGS84) [m], and its second zonal harmonic (EGM2008).
+EARTH_RADIUS_M, J2_EARTH = 6.378137e6, 1.08262668e-3
+_POLAR_RADIUS_M = 6.356752e6
 
 
 @dataclass(frozen=True)
@@ -115,3 +126,133 @@ class Orbit:
         left = float(np.sqrt(np.mean(np.sum((D - mu * E) ** 2, axis=1))))
         noise = float(np.sqrt(3 * 6) * difference_sigma(r, 3))
         return Acceleration(mu, left / max(size, 1e-300), noise / max(size, 1e-300))
+
+
+def check_above_earth(position_N: np.ndarray) -> None:
+    """Raise BadInput where a position (N, 3) [m] is below the Earth's surface, or not a number."""
+    nearest = float(np.min(np.linalg.norm(position_N, axis=-1), initial=np.inf))
+    if not nearest > _POLAR_RADIUS_M:  # also NaN
+        raise BadInput(
+            f"the orbit passes {nearest / 1e3:.4g} km from the Earth's centre, below its surface",
+            remedy="Check the unit (km labelled m?) and the origin of the positions: they count from the Earth's centre.",
+        )
+
+
+def gravity_at(position_N: np.ndarray, mu: float = MU_EARTH, j2: float = J2_EARTH) -> np.ndarray:
+    """Acceleration by a flattened planet.
+
+    -mu r / r^3 (1 + 3/2 J2 (R/r)^2 (1 - 5 z^2/r^2 + (0, 0, 2)))     Montenbruck and Gill, Satellite Orbits, section 3.2
+
+    Parameters
+    ----------
+    position_N : ndarray, shape (..., 3)
+        From the centre, inertial axes whose z is the pole. [m]  GCRS z serves: the pole is 0.15 deg from it in 2026.
+    mu : float
+        Gravitational parameter. [m3/s2]
+    j2 : float
+        Second zonal harmonic, for the Earth's equatorial radius; 0 for a point mass.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        [m/s2]
+    """
+    r = np.asarray(position_N, float)
+    size2 = np.sum(r * r, axis=-1, keepdims=True)
+    flat = 1.5 * j2 * EARTH_RADIUS_M**2 / size2
+    return -mu * r / size2**1.5 * (1 + flat * (1 - 5 * r[..., 2:] ** 2 / size2 + np.array([0.0, 0.0, 2.0])))
+
+
+def propagate(
+    position_N, velocity_N, since_s: np.ndarray, mu: float = MU_EARTH, j2: float = J2_EARTH
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and velocities of a body that falls freely about a flattened Earth.
+
+    Parameters
+    ----------
+    position_N, velocity_N : array_like, shape (3,)
+        State at time zero, inertial (GCRS). [m], [m/s]
+    since_s : ndarray, shape (N,)
+        Seconds from that state, in any order, negative ones too.
+    mu, j2 : float
+        As ``gravity_at`` takes them.
+
+    Returns
+    -------
+    position_N, velocity_N : ndarray, shape (N, 3)
+        [m], [m/s].  Integrated to 1e-10 of itself (1 cm a day).  Left out: higher harmonics (up to 1 km a day in low orbit),
+        drag (0.1 to 30 km a day at 500 to 300 km), Sun and Moon.
+    """
+    from scipy.integrate import solve_ivp
+
+    since_s = np.atleast_1d(np.asarray(since_s, float))
+    start = np.concatenate([np.asarray(position_N, float), np.asarray(velocity_N, float)])
+    states = np.tile(start, (len(since_s), 1))
+
+    def slope(_, x):
+        return np.concatenate([x[3:], gravity_at(x[:3], mu, j2)])
+
+    for side in (since_s > 0, since_s < 0):
+        if not side.any():
+            continue
+        at, back = np.unique(np.abs(since_s[side]), return_inverse=True)
+        sign = np.sign(since_s[side][0])
+        flown = solve_ivp(slope, (0, sign * at[-1]), start, "DOP853", t_eval=sign * at, rtol=1e-11, atol=1e-6)
+        states[side] = flown.y.T[back]
+    return states[:, :3], states[:, 3:]
+
+
+def state_of(elements: OrbitElements, mu: float = MU_EARTH) -> tuple[np.ndarray, np.ndarray]:
+    """Position [m] and velocity [m/s] at the elements' epoch, (3,) each, inertial axes (GCRS).
+
+    The elements are osculating: those of the Kepler orbit through the state itself, not mean elements."""
+    a, e = elements.semi_major_axis, elements.eccentricity
+    E = _eccentric_anomaly(elements.mean_anomaly, e)
+    b = a * np.sqrt(1 - e * e)
+    rate = np.sqrt(mu / a**3) / (1 - e * np.cos(E))
+    plane = np.array([[a * (np.cos(E) - e), b * np.sin(E), 0.0], [-a * rate * np.sin(E), b * rate * np.cos(E), 0.0]])
+    turn = Rotation.from_euler("ZXZ", [elements.ascending_node, elements.inclination, elements.argument_of_perigee])
+    position, velocity = turn.apply(plane)
+    return position, velocity
+
+
+def _eccentric_anomaly(mean_anomaly: float, e: float) -> float:
+    """E with E - e sin E = M.  The difference E - M is at most e, which brackets it."""
+    from scipy.optimize import brentq
+
+    M = float(np.remainder(mean_anomaly + np.pi, 2 * np.pi) - np.pi)
+    return float(brentq(lambda E: E - e * np.sin(E) - M, M - e - 1e-9, M + e + 1e-9, xtol=1e-15, rtol=1e-15))
+
+
+#: Elements are not carried further than this: drag alone has then moved a craft in low orbit along it by a good part. [s]
+_FURTHEST_S = 60 * 86_400.0
+
+
+def flown(elements: OrbitElements, tai_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and velocities along the orbit of a craft file.
+
+    Parameters
+    ----------
+    elements : OrbitElements
+        ``craft.orbit``.
+    tai_s : ndarray, shape (N,)
+        TAI since 2000-01-01T00:00:00 TAI. [s]
+
+    Returns
+    -------
+    position_N, velocity_N : ndarray, shape (N, 3)
+        Inertial (GCRS). [m], [m/s]  As ``propagate`` does it.
+
+    Raises
+    ------
+    BadInput
+        For times further than 60 days from the elements' epoch.
+    """
+    since_s = np.atleast_1d(np.asarray(tai_s, float)) - elements.epoch / NS
+    furthest = float(np.abs(since_s).max(initial=0.0))
+    if not furthest <= _FURTHEST_S:
+        raise BadInput(
+            f"[orbit] is given for {utc_label(elements.epoch)[:10]}, {furthest / 86_400:.0f} days from the time asked for",
+            remedy="Give elements of a date within 60 days, or orbit_position_x, _y, _z in the telemetry.",
+        )
+    return propagate(*state_of(elements), since_s)
