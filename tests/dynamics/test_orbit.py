@@ -7,10 +7,11 @@ import pytest
 
 from asflown.craft.load import load_craft
 from asflown.dynamics.environment import MU_EARTH
-from asflown.dynamics.frames import lvlh_axes
+from asflown.dynamics.frames import earth_fixed, lvlh_axes
 from asflown.dynamics.orbit import (
     EARTH_RADIUS_M,
     J2_EARTH,
+    Orbit,
     check_above_earth,
     flown,
     gravity_at,
@@ -100,6 +101,27 @@ def test_law_there_and_back_again():
 def test_an_orbit_long_after_its_epoch_is_refused():
     with pytest.raises(BadInput, match="100 days from the time asked for"):
         flown(ORBIT, [ORBIT.epoch / NS + 100 * DAY_S])
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("turning", [False, True])
+@pytest.mark.parametrize("span_s", [1200.0, 6000.0])
+def test_law_positions_in_another_unit_or_in_turning_axes_are_told_by_their_own_acceleration(scale, turning, span_s):
+    tai_s = ORBIT.epoch / NS + np.arange(0, span_s, 5.0)
+    r, _ = flown(ORBIT, tai_s)
+    seen = np.einsum("nij,nj->ni", earth_fixed(tai_s), r) if turning else r
+    noisy = scale * (seen + np.random.default_rng(4).normal(0, 3.0, r.shape))  # m, as a receiver's
+    words = Orbit(tai_s - tai_s[0], noisy).misreading()
+    unit = {1e-3: "in kilometres", 1.0: "", 1e3: "in metres"}[scale]
+    assert ("Earth-fixed" in words) == turning and unit in words and bool(words) == (turning or scale != 1.0)
+
+
+def test_law_positions_that_nothing_makes_an_orbit_have_no_other_reading():
+    t = np.arange(0.0, 1200, 5.0)
+    straight = np.array([7e6, 0, 0]) + t[:, None] * np.array([0, 7e3, 0])
+    assert Orbit(t, straight).misreading() == ""
+    still = Orbit(t, np.tile([5e6, 5e6, 0], (len(t), 1)))
+    assert still.misreading() == ""
 
 
 @pytest.mark.parametrize("position", [[6878.0, 0, 0], [6.2e6, 0, 0], [np.nan, 0, 0]])

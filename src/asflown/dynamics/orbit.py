@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 #: Equatorial radius of the Earth (WGS84) [m], and its second zonal harmonic (EGM2008).
 EARTH_RADIUS_M, J2_EARTH = 6.378137e6, 1.08262668e-3
 _POLAR_RADIUS_M = 6.356752e6
+#: The Earth turns at this rate. [rad/s]   IERS Conventions 2010, table 1.2
+EARTH_RATE_RAD_S = 7.292115e-5
 
 
 @dataclass(frozen=True)
@@ -126,6 +128,36 @@ class Orbit:
         left = float(np.sqrt(np.mean(np.sum((D - mu * E) ** 2, axis=1))))
         noise = float(np.sqrt(3 * 6) * difference_sigma(r, 3))
         return Acceleration(mu, left / max(size, 1e-300), noise / max(size, 1e-300))
+
+    def misreading(self) -> str:
+        """How else the positions must be meant to be an orbit about a known body, in words: 'in kilometres'; '' where as they stand
+        they are one, or where nothing else makes them one.  Positions too coarse to tell are left alone."""
+        as_it_stands = self.acceleration()
+        if not as_it_stands.told or (as_it_stands.free_fall and as_it_stands.body is not None):
+            return ""
+        for words, scale, earth_fixed in _READINGS:
+            position_N = scale * (self._turned_back() if earth_fixed else self.position_N)
+            other = Orbit(self.time_s, position_N)
+            found = other.acceleration()
+            body = found.body
+            if found.free_fall and body is not None and other.nearest_m > 0.99 * body.radius_m:
+                return words
+        return ""
+
+    def _turned_back(self) -> np.ndarray:
+        """The positions (N, 3) as they are in axes that do not turn, if these turn with the Earth."""
+        angle = EARTH_RATE_RAD_S * (self.time_s - self.time_s[0])
+        return Rotation.from_rotvec(angle[:, None] * [0.0, 0.0, 1.0]).apply(self.position_N)
+
+
+#: What positions are taken for by mistake: their scale in metres, and whether the axes turn with the Earth.
+_READINGS = (
+    ("in kilometres, labelled metres", 1e3, False),
+    ("in metres, labelled kilometres", 1e-3, False),
+    ("in Earth-fixed axes", 1.0, True),
+    ("in Earth-fixed axes and in kilometres, labelled metres", 1e3, True),
+    ("in Earth-fixed axes and in metres, labelled kilometres", 1e-3, True),
+)
 
 
 def check_above_earth(position_N: np.ndarray) -> None:
