@@ -10,7 +10,7 @@ from asflown.craft.load import load_craft
 from asflown.dynamics.frames import earth_fixed, geodetic
 from asflown.dynamics.magnetic_field import field_at
 from asflown.dynamics.nodes import through_nodes
-from asflown.dynamics.orbit import EARTH_RADIUS_M, flown
+from asflown.dynamics.orbit import EARTH_POLAR_RADIUS_M, EARTH_RADIUS_M, flown
 from asflown.dynamics.sun import ASTRONOMICAL_UNIT_M, SUN_RADIUS_M, sun_direction, sunlit
 from asflown.dynamics.thermosphere import density_at, exponential_density
 from asflown.kit.errors import BadInput
@@ -138,6 +138,23 @@ def test_law_the_penumbra_of_a_low_orbit_lasts_eight_seconds(hour):
     assert 0.1 * np.sum((lit > 0) & (lit < 1)) / 2 == pytest.approx(2 * 0.004650 / 1.1085e-3, abs=0.1)  # s
     share = sunlit(r, sun_direction(t))
     assert share.min() == 0 and share.max() == 1  # half past ten at the node: a third of the orbit is dark
+
+
+def test_law_over_the_pole_the_shadow_begins_at_the_flattened_limb():
+    angle = np.linspace(0, np.pi / 2, 400_001)
+    r = around(6.878e6, angle)[:, [0, 2, 1]]  # in the meridian
+    lit = sunlit(r, np.array([1.0, 0, 0]))
+    limb = np.arcsin(EARTH_POLAR_RADIUS_M / 6.878e6)
+    assert angle[np.searchsorted(lit, 0.5)] == pytest.approx(limb, abs=5e-5)  # rad: 0.05 s
+    tilted = np.array(
+        [np.cos(0.4), 0, np.sin(0.4)]
+    )  # and where the sun is not in the equator: the line to it just grazes
+    r = 6.878e6 * np.column_stack([-np.cos(angle), 0 * angle, np.sin(angle)])
+    edge = r[np.searchsorted(sunlit(r, tilted), 0.5)]
+    a2, b2 = EARTH_RADIUS_M**2, EARTH_POLAR_RADIUS_M**2
+    weights = np.array([1 / a2, 1 / a2, 1 / b2])
+    rr, rs, ss = (edge**2 @ weights, (edge * tilted) @ weights, tilted**2 @ weights)
+    assert rr - rs**2 / ss == pytest.approx(1, abs=5e-5)
 
 
 def test_law_far_behind_the_earth_a_ring_of_the_sun_is_left():

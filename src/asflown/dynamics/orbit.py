@@ -18,9 +18,8 @@ from .environment import MU_EARTH
 if TYPE_CHECKING:
     from ..craft.surroundings import OrbitElements
 
-#: Equatorial radius of the Earth (WGS84) [m], and its second zonal harmonic (EGM2008).
-EARTH_RADIUS_M, J2_EARTH = 6.378137e6, 1.08262668e-3
-_POLAR_RADIUS_M = 6.356752e6
+#: Equatorial and polar radius of the Earth (WGS84) [m], and its second zonal harmonic (EGM2008).
+EARTH_RADIUS_M, EARTH_POLAR_RADIUS_M, J2_EARTH = 6.378137e6, 6.3567523e6, 1.08262668e-3
 #: The Earth turns at this rate. [rad/s]   IERS Conventions 2010, table 1.2
 EARTH_RATE_RAD_S = 7.292115e-5
 
@@ -163,7 +162,7 @@ _READINGS = (
 def check_above_earth(position_N: np.ndarray) -> None:
     """Raise BadInput where a position (N, 3) [m] is below the Earth's surface, or not a number."""
     nearest = float(np.min(np.linalg.norm(position_N, axis=-1), initial=np.inf))
-    if not nearest > _POLAR_RADIUS_M:  # also NaN
+    if not nearest > EARTH_POLAR_RADIUS_M:  # also NaN
         raise BadInput(
             f"the orbit passes {nearest / 1e3:.4g} km from the Earth's centre, below its surface",
             remedy="Check the unit (km labelled m?) and the origin of the positions: they count from the Earth's centre.",
@@ -212,8 +211,8 @@ def propagate(
     Returns
     -------
     position_N, velocity_N : ndarray, shape (N, 3)
-        [m], [m/s].  Integrated to 1e-10 of itself (1 cm a day).  Left out: higher harmonics (up to 1 km a day in low orbit),
-        drag (0.1 to 30 km a day at 500 to 300 km), Sun and Moon.
+        [m], [m/s].  Integrated to 5 cm a day.  Left out: higher harmonics (kilometres a day along a low orbit), drag (3 km along
+        the orbit in the first day at 500 km, 100 km at 300 km, growing as time squared), Sun and Moon.
     """
     from scipy.integrate import solve_ivp
 
