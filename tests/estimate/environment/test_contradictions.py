@@ -8,6 +8,7 @@ from asflown.dynamics.environment import MU_EARTH
 from asflown.dynamics.frames import earth_fixed
 from asflown.dynamics.orbit import flown
 from asflown.estimate.environment import environment_of
+from asflown.estimate.environment.orbits import CARRIED
 from asflown.estimate.subject import subject_of
 from asflown.kit.errors import BadInput
 from asflown.kit.timeline import NS
@@ -59,3 +60,12 @@ def test_trap_an_orbit_below_the_surface_is_one_error():
 
     with pytest.raises(BadInput, match=r"passes 5900 km from the centre of the Earth, below its surface"):
         environment(under)
+
+
+@pytest.mark.parametrize(("days", "said"), [(0.5, False), (9.0, True)])
+def test_trap_elements_of_another_day_are_doubted(days, said):
+    channels = {f"quaternion_{a}": (T, np.full(len(T), 0.5)) for a in "wxyz"}
+    telemetry = telemetry_of(CRAFT.orbit.epoch + round(days * 86_400 * NS), **channels)
+    at = telemetry.channel("quaternion_w").tai_ns[::10]
+    found = environment_of(subject_of(telemetry, CRAFT), at, ("gravity-gradient",))
+    assert len(found.terms) == 1 and found.doubts.has(CARRIED) == said

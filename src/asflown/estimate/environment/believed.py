@@ -23,7 +23,7 @@ from ...kit.doubts import Doubts
 from ...kit.errors import check_choice
 from ...kit.timeline import NS
 from ...telemetry.channels import AXES
-from .orbits import gravity_words, longest_gap, orbit_in, refuse_contradictions
+from .orbits import carried, gravity_words, longest_gap, orbit_in, refuse_contradictions
 from .sky import Place, Seen, attitude_at, field_at_craft, rods_at, sun_at_craft
 from .term import Term, levers
 
@@ -164,6 +164,7 @@ def _place(subject: Subject, tai_ns: np.ndarray) -> tuple[Place, Doubts, str]:
 
         position, velocity = flown(craft.orbit, tai_ns / NS)
         orbit, body, why = Orbit(t, position), BODIES[0].name, ""
+        doubts = doubts + [carried(craft.orbit.epoch, tai_ns)]
     R = attitude_at(tlm, tai_ns)
     return Place(tai_ns, tlm.dated, R, orbit, position, velocity, body), doubts, why
 

@@ -58,6 +58,12 @@ MISREAD = Kind(
     "orbit_position is an orbit about a known body only if its values are {reading}",
     "Label them with the unit they have, and give them in inertial axes (GCRS, J2000).",
 )  # fmt: skip
+CARRIED = Kind(
+    "environment.orbit-carried", Severity.CAUTION,
+    "the positions are those of [orbit], carried over {days:.1f} days with the Earth's flattening alone: drag moves a craft in low orbit "
+    "along it by kilometres in a day and by hundreds in ten",
+    "Give elements of that day in the craft file, or orbit_position_x, _y, _z in the telemetry.",
+)  # fmt: skip
 VELOCITY_APART = Kind(
     "environment.velocity-apart", Severity.CAUTION,
     "orbit_velocity differs from the change of orbit_position by {percent:.0f} %: the positions are used",
@@ -108,6 +114,12 @@ def _about(orbit: Orbit, left_out: Callable[[Orbit], str]) -> tuple[Orbit | None
 def _misread(orbit: Orbit) -> Doubt | None:
     words = orbit.misreading()
     return MISREAD(reading=words) if words else None
+
+
+def carried(epoch_ns: int, tai_ns: np.ndarray) -> Doubt | None:
+    """A doubt about elements that are more than a day from the instants (N,) they are used at."""
+    days = float(np.abs(tai_ns - epoch_ns).max()) / (86_400 * NS)
+    return CARRIED(days=days) if days > 1 else None
 
 
 def refuse_contradictions(telemetry: Telemetry, doubts: Doubts) -> None:
