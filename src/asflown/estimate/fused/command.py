@@ -1,8 +1,9 @@
 """The motion that the controller follows, and the torque it adds to follow it.
 
 Of a body at rate w = w_c + d, w_c commanded, I d' = T - w x H - I w_c' + u.  The controller's u is that of a hold on the
-deviation d, plus a feed-forward f that is known from w_c and H: with h + integral of f in place of the wheels' momentum h,
-and w x H + I w_c' - f taken off as a known torque, the model of a hold serves for any motion.
+deviation d, plus an f that is known from w_c and H: what it feeds forward, and, where it does not track the commanded rate,
+what that makes of its damping.  With h + integral of f in place of the wheels' momentum h, and w x H + I w_c' - f taken off as
+a known torque, the model of a hold serves for any motion.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import BSpline, make_lsq_spline, make_smoothing_spline
 from scipy.spatial.transform import Rotation, Slerp
 
+from ...dynamics.loop import filtered_rate
 from ...kit.rotations import attitude_error, rates_between, rotation, turned_by
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
@@ -95,18 +97,25 @@ def command_of(
     rate, acceleration, variance, source = _commanded(subject, grid, series, law)
     at = grid.seconds
     h = np.column_stack([np.interp(at, stored[0], stored[1][:, j]) for j in range(3)])
-    turn, push = np.cross(rate, rate @ I_B + h), acceleration @ I_B
+    J = law.believed_kgm2(I_B)
+    turn, push = np.cross(rate, rate @ J + h), acceleration @ J
     gyroscopic = law.gyroscopic
     if gyroscopic is None:
-        gyroscopic = _fed_forward(law, I_B, series, turn)
+        gyroscopic = _fed_forward(law, J, series, turn)
     pushed = gyroscopic if law.acceleration is None else law.acceleration
-    feed = gyroscopic * turn + pushed * push
-    fed = gyroscopic * cumulative_trapezoid(turn, at, axis=0, initial=0) + pushed * (rate - rate[0]) @ I_B
+    damped = np.zeros_like(rate) if law.tracking else _damped(law, rate, grid.step_s) @ J
+    feed = gyroscopic * turn + pushed * push + damped
+    fed = cumulative_trapezoid(gyroscopic * turn + damped, at, axis=0, initial=0) + pushed * (rate - rate[0]) @ J
     for j, of_axis in series.items():
-        more = _beside(of_axis, fed[:, j], at, I_B[j, j] * law.kd_per_s, law)
+        more = _beside(of_axis, fed[:, j], at, J[j, j] * law.kd_per_s, law)
         feed[:, j], fed[:, j] = feed[:, j] + more.at(at, 1), fed[:, j] + more.at(at, 0)
         variance[1, j] += more.variance[0] / I_B[j, j] ** 2
     return Command(at, rate, acceleration, feed, fed, variance, source, gyroscopic, pushed)
+
+
+def _damped(law: WheelController, rate: np.ndarray, step_s: float) -> np.ndarray:
+    """What a law that does not track does against the commanded rates (M, 3), per unit inertia."""
+    return -law.kd_per_s * np.column_stack([filtered_rate(law, rate[:, j], step_s) for j in range(3)])
 
 
 def _commanded(subject: Subject, grid: Grid, series, law: WheelController):
@@ -212,14 +221,14 @@ def _smoothing(law: WheelController, at: np.ndarray) -> tuple[int, float]:
     return max(1, round(float(at[-1]) / spacing)), max(_BLOCK_S, 2 / law.natural_frequency_rad_s)
 
 
-def _fed_forward(law: WheelController, I_B: np.ndarray, series, turn: np.ndarray) -> bool:
+def _fed_forward(law: WheelController, J: np.ndarray, series, turn: np.ndarray) -> bool:
     """Whether the actuators' mean action is nearer to what the law does with w x H fed forward than without."""
     beside = np.zeros(3)
     for j, of_axis in series.items():
         row = {s.row: s for s in of_axis}
         h, e = row[MOMENTUM], row[ATTITUDE_ERROR]
         line = np.polynomial.Polynomial.fit(h.seconds, h.values, 1).convert().coef
-        held = I_B[j, j] * law.kd_per_s * law.kp_per_s * float(np.mean(e.values))
+        held = J[j, j] * law.kd_per_s * law.kp_per_s * float(np.mean(e.values))
         beside[j] = -line[1] - held
     mean = turn.mean(axis=0)
     return bool(np.linalg.norm(beside - mean) < np.linalg.norm(beside))

@@ -64,7 +64,7 @@ def wheel_loop(scenario: Scenario, now: CraftAt) -> Loop:
             remedy="Give period under [wheel_controller], or in the scenario.",
         )
     a, b, c, d = _rate_filter_of(law, period, run.filter)
-    believed = now.inertia_kgm2 if run.inertia is None else tensor(run.inertia)
+    believed = law.believed_kgm2(now.inertia_kgm2) if run.inertia is None else tensor(run.inertia)
     natural = run.friction_bandwidth if run.friction_compensation else 0.0
     return Loop(
         period=float(period),
