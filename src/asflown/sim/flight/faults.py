@@ -41,7 +41,7 @@ def bearing_rows(scenario: Scenario, wheels: tuple[Wheel, ...], step_s: float) -
     for w in wheels:
         drag = true_drag(scenario, w)
         spikes = sum(d.torque for d in scenario.drag_spikes if d.wheel == w.name)
-        slowing = (max(drag.coulomb, drag.stiction) + spikes) / w.spin_inertia
+        slowing = (max(drag.coulomb, drag.stiction) + spikes) / float(w.spin_inertia or np.inf)
         rows.append(
             [drag.viscous, drag.coulomb, drag.stiction, max(DRAG_REVERSAL_RATE, slowing * step_s / _STEPS_THROUGH_REST)]
         )

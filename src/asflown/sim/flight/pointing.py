@@ -99,8 +99,8 @@ def _at_place(p: Pointing, along: Along, t) -> Rotation:
 
 def _on_ellipsoid(p: Pointing) -> np.ndarray:
     """Earth-fixed place of geodetic latitude, longitude and height. (3,) [m]"""
-    e2 = _FLATTENING * (2 - _FLATTENING)
-    sine, cosine = np.sin(p.latitude), np.cos(p.latitude)
+    e2, latitude, longitude = _FLATTENING * (2 - _FLATTENING), p.latitude or 0.0, p.longitude or 0.0
+    sine, cosine = np.sin(latitude), np.cos(latitude)
     N = _RADIUS_M / np.sqrt(1 - e2 * sine**2)
     across = (N + p.height) * cosine
-    return np.array([across * np.cos(p.longitude), across * np.sin(p.longitude), (N * (1 - e2) + p.height) * sine])
+    return np.array([across * np.cos(longitude), across * np.sin(longitude), (N * (1 - e2) + p.height) * sine])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, cast
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -21,6 +21,7 @@ from .plant import CURVES, LIT, World
 
 if TYPE_CHECKING:
     from ...craft.model import CraftAt
+    from ...craft.surroundings import OrbitElements
     from ..scenario import Environment, Scenario
 
 #: Sunlight's pressure on what absorbs it, at one astronomical unit: 1361 W/m2 over the speed of light. [Pa]
@@ -153,10 +154,10 @@ def acting_sunlight(e: Environment, now: CraftAt) -> tuple[np.ndarray | None, np
     lever = e.sunlight_lever or (None if known is None else known.lever)
     if known is None and lever is None and e.sunlight:
         _refuse_undescribed(now, "sunlight", "[sunlight]", "sunlight_lever")
-    if e.sunlight is False or (known is None and lever is None):
+    if e.sunlight is False:
         return None, none
-    if lever is not None:
-        return np.array(lever, float), none
+    if lever is not None or known is None:
+        return None if lever is None else np.array(lever, float), none
     rows = [
         [SUN_PRESSURE * f.area, *_unit(f.normal), *_from_cm(f.center, now), f.specular, f.diffuse] for f in known.facets
     ]
@@ -170,10 +171,10 @@ def acting_drag(e: Environment, now: CraftAt) -> tuple[np.ndarray | None, np.nda
     lever = e.drag_lever or (None if known is None else known.lever)
     if known is None and lever is None and e.drag:
         _refuse_undescribed(now, "drag", "[aerodynamics]", "drag_lever")
-    if e.drag is False or (known is None and lever is None):
+    if e.drag is False:
         return None, none
-    if lever is not None:
-        return np.array(lever, float), none
+    if lever is not None or known is None:
+        return None if lever is None else np.array(lever, float), none
     rows = [[known.drag_coefficient * f.area, *_unit(f.normal), *_from_cm(f.center, now)] for f in known.facets]
     return None, np.array(rows, float)
 
@@ -208,7 +209,7 @@ def _path(scenario: Scenario, now: CraftAt, t: np.ndarray) -> tuple[np.ndarray, 
             )
         return flown(now.craft.orbit, scenario.epoch_ns / NS + t)
     if orbit.file is None:
-        return propagate(*state_of(orbit), t)
+        return propagate(*state_of(cast("OrbitElements", orbit)), t)  # the same elements, of the scenario's epoch
     times, places = read_table(scenario.folder / orbit.file, "position", "m")
     if times[0] > t[0] or times[-1] < t[-1]:
         raise BadInput(
