@@ -69,7 +69,7 @@ def show(
     if k := c.wheel_controller:
         print(f"  wheel controller: {k.bandwidth:g} Hz, damping {k.damping:g}, KP {k.kp_per_s:.6f} 1/s, KD {k.kd_per_s:.6f} 1/s\n"
               f"                    {_filter(k)}, {'period not known' if k.period is None else f'every {k.period:g} s'}")  # fmt: skip
-        if (said := _fed(k)):
+        if said := _fed(k):
             print(wrapped(" " * 20, said))
     for m in c.mechanisms:
         print(
