@@ -11,8 +11,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from asflown.craft.load import load_craft
-from asflown.kit.timeline import utc_to_tai_ns
-from flights import telemetry_of
+from asflown.dynamics.magnetic_field import field_at
+from asflown.dynamics.sun import sun_direction, sunlit
+from asflown.kit.timeline import NS, utc_to_tai_ns
+from flights import telemetry_of, with_values
 
 EPOCH = utc_to_tai_ns("2026-05-04T06:00:00")
 INERTIA = np.array([[12.4, 0.15, -0.22], [0.15, 14.1, 0.08], [-0.22, 0.08, 9.7]])
@@ -143,3 +145,51 @@ def coverage(result, at, torque) -> np.ndarray:
     """Share of instants whose 95 % band holds the truth, per axis."""
     true = np.column_stack([np.interp(result.time_s, at, torque[:, j]) for j in range(3)])
     return np.mean(np.abs(result.torque_Nm - true) <= 1.96 * result.torque_sigma_Nm, axis=0)
+
+
+def pointed(duration_s=2400.0, cadence_s=4.0, turn: Rotation | None = None, seed=2):
+    """Telemetry without dynamics: attitude (nadir, slowly yawing, then turned), rates, orbit, field and Sun in body axes, wheels at rest."""
+    at = np.arange(0, duration_s, cadence_s)
+    yaw = 0.4 * np.sin(2 * np.pi * at / 900)
+    R = nadir(at) * Rotation.from_rotvec(np.outer(yaw, [0, 0, 1]))
+    turn = turn or Rotation.identity()
+    R = R * turn
+    position, velocity = orbit(at)
+    rng = np.random.default_rng(seed)
+    tai_s = EPOCH / NS + at
+    B_N, s_N = field_at(position, tai_s), sun_direction(tai_s)
+    lit = sunlit(position, s_N)[:, None] > 0.5
+    rate = turn.inv().apply(nadir_rate(at, yaw))
+    vectors = {"orbit_position": position, "orbit_velocity": velocity, "body_rate": rate + 2e-6 * rng.normal(size=(len(at), 3)),
+               "magnetic_field": R.inv().apply(B_N) + 1e-7 * rng.normal(size=(len(at), 3)),
+               "sun_direction": lit * R.inv().apply(s_N)}  # fmt: skip
+    made = {f"{n}_{a}": (at, v[:, j]) for n, v in vectors.items() for j, a in enumerate("xyz")}
+    made |= {f"quaternion_{m}": (at, R.as_quat()[:, k]) for k, m in enumerate("xyzw")}
+    made |= {f"wheel_rate_W{k}": (at, 100.0 + 0.01 * rng.normal(size=len(at))) for k in (1, 2, 3, 4)}
+    return telemetry_of(EPOCH, **made)
+
+
+def nadir_rate(at, yaw):
+    """Body rates of nadir pointing turned by ``yaw`` about z."""
+    back = Rotation.from_rotvec(np.outer(-yaw, [0, 0, 1]))
+    return back.apply([0.0, -RATE, 0.0]) + np.outer(np.gradient(yaw, at), [0, 0, 1])
+
+
+def vectors_of(telemetry, stem: str) -> np.ndarray:
+    return np.column_stack([telemetry.channel(f"{stem}_{a}").values for a in "xyz"])
+
+
+def with_vectors(telemetry, stem: str, values: np.ndarray):
+    for j, a in enumerate("xyz"):
+        telemetry = with_values(telemetry, f"{stem}_{a}", values[:, j])
+    return telemetry
+
+
+def attitude_of(telemetry) -> Rotation:
+    return Rotation.from_quat(np.column_stack([telemetry.channel(f"quaternion_{m}").values for m in "xyzw"]))
+
+
+def with_attitude(telemetry, R: Rotation):
+    for k, m in enumerate("xyzw"):
+        telemetry = with_values(telemetry, f"quaternion_{m}", R.as_quat()[:, k])
+    return telemetry
