@@ -153,6 +153,7 @@ class Orbit:
 _READINGS = (
     ("in kilometres, labelled metres", 1e3, False),
     ("in metres, labelled kilometres", 1e-3, False),
+    ("in feet, labelled metres", 0.3048, False),
     ("in Earth-fixed axes", 1.0, True),
     ("in Earth-fixed axes and in kilometres, labelled metres", 1e3, True),
     ("in Earth-fixed axes and in metres, labelled kilometres", 1e-3, True),

@@ -23,7 +23,7 @@ from ...kit.doubts import Doubts
 from ...kit.errors import check_choice
 from ...kit.timeline import NS
 from ...telemetry.channels import AXES
-from .orbits import gravity_words, longest_gap, orbit_in
+from .orbits import carried, gravity_words, longest_gap, orbit_in, refuse_contradictions
 from .sky import Place, Seen, attitude_at, field_at_craft, rods_at, sun_at_craft
 from .term import Term, levers
 
@@ -111,7 +111,7 @@ def environment_of(
     Raises
     ------
     BadInput
-        For a name that is no term.
+        For a name that is no term, and for positions that contradict themselves (another unit, Earth-fixed axes, underground).
     """
     for name in which:
         check_choice(name, NAMES, "term")
@@ -148,6 +148,7 @@ def _place(subject: Subject, tai_ns: np.ndarray) -> tuple[Place, Doubts, str]:
     t = (tai_ns - start) / NS
     words = gravity_words(None if subject.relative else subject.inertia_kgm2, float(t[-1]))
     orbit, body, doubts, count = orbit_in(tlm, start, words)
+    refuse_contradictions(tlm, doubts)
     position, velocity, why = None, None, "orbit_position_x, _y, _z, or [orbit] in the craft file"
     if orbit is not None:
         gap = longest_gap(orbit, float(t[0]), float(t[-1]))
@@ -163,6 +164,7 @@ def _place(subject: Subject, tai_ns: np.ndarray) -> tuple[Place, Doubts, str]:
 
         position, velocity = flown(craft.orbit, tai_ns / NS)
         orbit, body, why = Orbit(t, position), BODIES[0].name, ""
+        doubts = doubts + [carried(craft.orbit.epoch, tai_ns)]
     R = attitude_at(tlm, tai_ns)
     return Place(tai_ns, tlm.dated, R, orbit, position, velocity, body), doubts, why
 

@@ -10,6 +10,7 @@ import numpy as np
 from ...dynamics.environment import MU_EARTH, gravity_gradient_bound
 from ...dynamics.orbit import BODIES, Orbit
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
+from ...kit.errors import BadInput
 from ...kit.timeline import NS
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
@@ -52,6 +53,17 @@ NOT_PLAUSIBLE = Kind(
     "gravity gradient is left out",
     "Check the unit and the origin of orbit_position.",
 )  # fmt: skip
+MISREAD = Kind(
+    "environment.positions-misread", Severity.SUSPECT,
+    "orbit_position is an orbit about a known body only if its values are {reading}",
+    "Label them with the unit they have, and give them in inertial axes (GCRS, J2000).",
+)  # fmt: skip
+CARRIED = Kind(
+    "environment.orbit-carried", Severity.CAUTION,
+    "the positions are those of [orbit], carried over {days:.1f} days with the Earth's flattening alone: drag moves a craft in low orbit "
+    "along it by kilometres in a day and by hundreds in ten",
+    "Give elements of that day in the craft file, or orbit_position_x, _y, _z in the telemetry.",
+)  # fmt: skip
 VELOCITY_APART = Kind(
     "environment.velocity-apart", Severity.CAUTION,
     "orbit_velocity differs from the change of orbit_position by {percent:.0f} %: the positions are used",
@@ -89,14 +101,34 @@ def _about(orbit: Orbit, left_out: Callable[[Orbit], str]) -> tuple[Orbit | None
             return None, "", [NOT_PLAUSIBLE(nearest_km=nearest_km)]
         return orbit, earth.name, [BODY_ASSUMED()]
     if not found.free_fall:
-        return None, "", [NOT_FREE_FALL(percent=100 * found.misfit, left_out=left_out(orbit))]
+        return None, "", [_misread(orbit), NOT_FREE_FALL(percent=100 * found.misfit, left_out=left_out(orbit))]
     body = found.body
     if body is None:
         unknown = BODY_UNKNOWN(mu_m3_s2=found.mu, nearest_km=nearest_km)
-        return replace(orbit, mu=found.mu), "that body", [unknown]
+        return replace(orbit, mu=found.mu), "that body", [_misread(orbit), unknown]
     # of a planet with moons the table's own acceleration serves as well; the constant has less noise
     below = BELOW_SURFACE(body=body.name, nearest_km=nearest_km) if orbit.nearest_m < 0.99 * body.radius_m else None
     return replace(orbit, mu=body.mu), body.name, [below]
+
+
+def _misread(orbit: Orbit) -> Doubt | None:
+    words = orbit.misreading()
+    return MISREAD(reading=words) if words else None
+
+
+def carried(epoch_ns: int, tai_ns: np.ndarray) -> Doubt | None:
+    """A doubt about elements that are more than a day from the instants (N,) they are used at."""
+    days = float(np.abs(tai_ns - epoch_ns).max()) / (86_400 * NS)
+    return CARRIED(days=days) if days > 1 else None
+
+
+def refuse_contradictions(telemetry: Telemetry, doubts: Doubts) -> None:
+    """Raise BadInput where positions contradict themselves: field, Sun and air at such a place would say nothing."""
+    for d in doubts.of(MISREAD, BELOW_SURFACE, NOT_PLAUSIBLE):
+        raise BadInput(
+            str(d).removesuffix(": the gravity gradient is left out"), file=telemetry.source or None,
+            channel="orbit_position", remedy=d.remedy,
+        )  # fmt: skip
 
 
 def gravity_words(I_B: np.ndarray | None, span_s: float) -> Callable[[Orbit], str]:
