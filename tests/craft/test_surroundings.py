@@ -1,10 +1,13 @@
 """The tables of a craft file for what acts on it in orbit: read, refused, and told by craft check."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from asflown.craft.abilities import abilities
 from asflown.craft.load import load_craft
+from asflown.craft.surroundings import Aerodynamics, Facet, Magnetics, OrbitElements, Sunlight, TorqueRod
 from asflown.craft.template import craft_template, outline
 from asflown.kit.errors import BadInput
 
@@ -109,3 +112,10 @@ def test_every_line_that_the_template_offers_is_valid(tmp_path):
     keys = [n.removeprefix("# ") for n in lines if n.startswith(("# [", "# ")) and ("= " in n or n.startswith("# ["))]
     c = craft(tmp_path, "\n".join(n for n in keys if not n.startswith(("torque_constant", "rate_limit"))))
     assert c.orbit and c.magnetics and c.torque_rods and c.sunlight and c.aerodynamics.in_orbit and c.wheel_controller
+
+
+def test_the_page_names_every_key():
+    page = (Path(__file__).resolve().parents[2] / "docs" / "craft.md").read_text(encoding="utf-8")
+    for model in (OrbitElements, Magnetics, TorqueRod, Sunlight, Aerodynamics, Facet):
+        missing = [key for key in model.model_fields if f"`{key}`" not in page and f"{key} = " not in page]
+        assert not missing, (model.__name__, missing)

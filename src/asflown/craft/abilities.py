@@ -35,11 +35,7 @@ def abilities(craft: Craft) -> tuple[Ability, ...]:
     thrusters = "" if craft.thrusters else "no [[thrusters]]"
     center = "" if craft.stated_center else "no center_of_mass: taken as the middle of the thrusters"
     loop = "" if craft.wheel_controller else "no [wheel_controller]: the actuators' action is taken as measured"
-    drag = (
-        ""
-        if craft.aerodynamics and craft.aerodynamics.in_flyby
-        else "no drag of a flyby in [aerodynamics]"
-    )
+    drag = "" if craft.aerodynamics and craft.aerodynamics.in_flyby else "no drag of a flyby in [aerodynamics]"
     orbit = "" if craft.orbit else "no [orbit]: needs orbit_position_x|y|z"
     known = _known_note(craft)
     return (

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict
 
+from ..kit.errors import BadInput
 from ..kit.quantities import numbers, quantity
 from ..kit.timeline import utc_to_tai_ns
 
@@ -23,12 +25,28 @@ def _in(unit: str, count: int = 0) -> Any:
     return Annotated[kind, BeforeValidator(parse)]
 
 
+def _cycles(text):
+    return _turns(text) / (2 * np.pi)
+
+
+def _turns(text):
+    """A frequency in cycles or in radians a second -> rad/s."""
+    try:
+        return quantity(text, "rad/s")
+    except BadInput as why:
+        try:
+            return 2 * np.pi * quantity(text, "Hz")
+        except BadInput:
+            raise BadInput(why.what, remedy='Give it in "Hz" or in "rad/s".') from None
+
+
 if TYPE_CHECKING:  # what the values are once loaded
     Kilogram = float
     Second = float
     Newton = float
     Pascal = float
-    Hertz = float
+    Frequency = float
+    AngularFrequency = float
     KilogramMetre2 = float
     NewtonMetre = float
     NewtonMetreSecond = float
@@ -49,7 +67,9 @@ if TYPE_CHECKING:  # what the values are once loaded
     AmpereMetre2 = float
     KilogramPerMetre3 = float
 else:  # how they are written in TOML
-    Kilogram, Second, Newton, Hertz, Pascal = _in("kg"), _in("s"), _in("N"), _in("Hz"), _in("Pa")
+    Kilogram, Second, Newton, Pascal = _in("kg"), _in("s"), _in("N"), _in("Pa")
+    Frequency = Annotated[float, BeforeValidator(_cycles)]  # in Hz or rad/s, kept as Hz
+    AngularFrequency = Annotated[float, BeforeValidator(_turns)]  # in Hz or rad/s, kept as rad/s
     KilogramMetre2, NewtonMetre, NewtonMetreSecond = _in("kg m2"), _in("N m"), _in("N m s")
     Radian, RadianPerSecond, ViscousDrag = _in("rad"), _in("rad/s"), _in("N m s / rad")
     NewtonMetrePerAmpere = _in("N m / A")

@@ -20,10 +20,11 @@ from ..kit.quantities import quantity
 from ..kit.result import Input
 from ..kit.timeline import NS, utc_label
 from .fields import (
+    AngularFrequency,
     Date,
     Described,
     Direction,
-    Hertz,
+    Frequency,
     InertiaElements,
     InertiaRatio,
     Kilogram,
@@ -224,20 +225,37 @@ class ThrusterController(Described):
 class RateFilter(Described):
     """Identical second-order low-pass sections in cascade."""
 
-    natural_frequency: RadianPerSecond = Field(gt=0)
+    natural_frequency: AngularFrequency = Field(gt=0)
     damping: float = Field(gt=0)
     sections: Literal[2] = 2
 
 
 class WheelController(Described):
-    """Proportional-derivative control on filtered rate (cover paper eqs 12, 13; see dynamics.loop)."""
+    """Proportional-derivative control on the (filtered) rate, with what is fed forward (cover paper eqs 12, 13; see dynamics.loop).
 
-    bandwidth: Hertz = Field(gt=0)
+    u = D (KD (w_c - F(w)) + KD KP e)  [+ w x (J w + h)]  [+ J w_c']
+
+    u the torque on the body, e the attitude's error and w_c the commanded rate, h the wheels' momentum, J the inertia that the
+    controller believes and D its diagonal, F the rate filter."""
+
+    bandwidth: Frequency = Field(gt=0)
     damping: float = Field(gt=0)
     rate_filter: RateFilter | None = None  # None: the rate itself
     period: Second | None = Field(default=None, gt=0)  # None: not known
-    gyroscopic: bool | None = None  # whether w x H is fed forward; None: not known
-    acceleration: bool | None = None  # whether inertia x commanded acceleration is
+    gyroscopic: bool | None = None  # whether w x (J w + h) is fed forward; None: not known
+    acceleration: bool | None = None  # whether J x commanded acceleration is
+    tracking: bool = True  # whether the rate's error is against the commanded rate; else against none
+    inertia: InertiaElements | None = None  # J; None: the craft's own
+
+    @model_validator(mode="after")
+    def _possible(self):
+        if self.inertia is not None:
+            check_inertia(tensor(self.inertia), "[wheel_controller] inertia")
+        return self
+
+    def believed_kgm2(self, I_B: np.ndarray) -> np.ndarray:
+        """J (3, 3) of a craft whose own tensor is ``I_B``."""
+        return I_B if self.inertia is None else tensor(self.inertia)
 
     @property
     def natural_frequency_rad_s(self) -> float:
@@ -277,7 +295,7 @@ class FlexibleMode(Described):
     """One appendage mode in hybrid coordinates; ``coupling`` is the row delta of d/dt(delta eta_dot)."""
 
     name: str
-    frequency: Hertz
+    frequency: Frequency
     damping: float
     coupling: ModeCoupling
     source: str = ""
@@ -291,7 +309,7 @@ class Pendulum(Described):
     pivot: MetreVector  # from the craft's centre of mass
     direction: Direction  # from the pivot to the mass at rest
     length: Metre = Field(gt=0)
-    frequency: Hertz = Field(gt=0)
+    frequency: Frequency = Field(gt=0)
     damping: float = Field(ge=0)
     source: str = ""
 
@@ -371,6 +389,10 @@ class Craft(Described):
         relative = {w.spin_inertia is None for w in self.wheels}
         if len(relative) > 1:
             raise ValueError("give the spin inertia of every wheel or of none")
+        if relative == {True} and self.wheel_controller is not None and self.wheel_controller.inertia is not None:
+            raise ValueError(
+                "[wheel_controller] inertia needs wheels of known spin_inertia: results are per unit of it"
+            )
         return self
 
     @property

@@ -4,7 +4,7 @@ Times are TAI seconds since 2000-01-01T00:00:00 TAI, the telemetry's own axis (`
 the IAU (2006 precession, 2000A nutation) as ERFA computes it; nothing is downloaded.
 
 UT1 is taken as UTC: they differ by less than 0.9 s by definition, 14 arcsec of the Earth's rotation or 0.5 km at 7000 km.  Polar
-motion is left out: 0.5 arcsec.  A field or a density at that place changes by less than 1e-3 of itself.
+motion is left out: 0.5 arcsec.  The magnetic field changes by 1 nT over that.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def earth_fixed(tai_s: np.ndarray) -> np.ndarray:
     -------
     ndarray, shape (N, 3, 3)
         R3(Earth rotation angle) x celestial-to-intermediate matrix (IERS Conventions 2010, eq 5.1, without polar motion).
-        Good to 14 arcsec: UT1 taken as UTC (0.9 s at most; the difference has been below 0.3 s since 2017).
+        Good to 14 arcsec: UT1 taken as UTC (0.9 s at most).
     """
     import erfa
 

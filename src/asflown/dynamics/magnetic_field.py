@@ -1,7 +1,8 @@
 """The Earth's magnetic field along an orbit: IGRF-14 as ppigrf evaluates it.
 
-IGRF is the field of the core: the crust and the currents above the atmosphere are not in it.  In low orbit they add 30 to 100 nT of
-25,000 to 50,000 nT on quiet days, several hundred in a magnetic storm (Alken et al 2021, doi:10.1186/s40623-020-01288-x).
+IGRF (Alken et al 2021, doi:10.1186/s40623-020-01288-x, and its fourteenth generation, doi:10.5281/zenodo.14012302) is the field of
+the core.  The crust and the currents above the atmosphere are not in it: tens of nT of 20,000 to 50,000 in low orbit on a quiet day,
+several hundred in a magnetic storm.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from .frames import earth_fixed
 from .nodes import through_nodes
 from .orbit import check_above_earth
 
-#: One sigma of the model on a quiet day in low orbit. [T]   sources as above
+#: One sigma of the model on a quiet day in low orbit, each component: assumed, for what it leaves out. [T]
 SIGMA_T = 1e-7
 
 #: Nodes along the orbit: degree 13 changes over 400 s and more, so that the spline errs by less than 0.5 nT. [s]

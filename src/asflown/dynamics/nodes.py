@@ -20,7 +20,7 @@ def through_nodes(time_s: np.ndarray, step_s: float, evaluate: Callable[[np.ndar
     Parameters
     ----------
     time_s : ndarray, shape (N,)
-        Instants in any order. [s]
+        Instants in any order. [s]  Where one comes twice (several places at one instant) each is evaluated.
     step_s : float
         Largest distance of two nodes. [s]  Nothing is joined across a longer gap.
     evaluate : callable
@@ -32,8 +32,8 @@ def through_nodes(time_s: np.ndarray, step_s: float, evaluate: Callable[[np.ndar
         A cubic spline between nodes that lie h apart errs by 5/384 h^4 times the fourth derivative.
     """
     t, first, back = np.unique(np.asarray(time_s, float), return_index=True, return_inverse=True)
-    if len(t) < _FEWEST or np.median(np.diff(t)) > step_s / 2:
-        return evaluate(first)[back]
+    if len(t) < max(_FEWEST, len(back)) or np.median(np.diff(t)) > step_s / 2:
+        return evaluate(np.arange(len(back)))
     cuts = np.flatnonzero(np.diff(t) > step_s) + 1
     parts = np.split(np.arange(len(t)), cuts)
     nodes = [_nodes(t, part, step_s) for part in parts]

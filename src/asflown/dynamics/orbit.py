@@ -18,9 +18,10 @@ from .environment import MU_EARTH
 if TYPE_CHECKING:
     from ..craft.surroundings import OrbitElements
 
-#: Equatorial radius of the Earth (WGS84) [m], and its second zonal harmonic (EGM2008).
-EARTH_RADIUS_M, J2_EARTH = 6.378137e6, 1.08262668e-3
-_POLAR_RADIUS_M = 6.356752e6
+#: Equatorial and polar radius of the Earth (WGS84) [m], and its second zonal harmonic (EGM2008).
+EARTH_RADIUS_M, EARTH_POLAR_RADIUS_M, J2_EARTH = 6.378137e6, 6.3567523e6, 1.08262668e-3
+#: The Earth turns at this rate. [rad/s]   IERS Conventions 2010, table 1.2
+EARTH_RATE_RAD_S = 7.292115e-5
 
 
 @dataclass(frozen=True)
@@ -127,11 +128,42 @@ class Orbit:
         noise = float(np.sqrt(3 * 6) * difference_sigma(r, 3))
         return Acceleration(mu, left / max(size, 1e-300), noise / max(size, 1e-300))
 
+    def misreading(self) -> str:
+        """How else the positions must be meant to be an orbit about a known body, in words: 'in kilometres'; '' where as they stand
+        they are one, or where nothing else makes them one.  Positions too coarse to tell are left alone."""
+        as_it_stands = self.acceleration()
+        if not as_it_stands.told or (as_it_stands.free_fall and as_it_stands.body is not None):
+            return ""
+        for words, scale, earth_fixed in _READINGS:
+            position_N = scale * (self._turned_back() if earth_fixed else self.position_N)
+            other = Orbit(self.time_s, position_N)
+            found = other.acceleration()
+            body = found.body
+            if found.free_fall and body is not None and other.nearest_m > 0.99 * body.radius_m:
+                return words
+        return ""
+
+    def _turned_back(self) -> np.ndarray:
+        """The positions (N, 3) as they are in axes that do not turn, if these turn with the Earth."""
+        angle = EARTH_RATE_RAD_S * (self.time_s - self.time_s[0])
+        return Rotation.from_rotvec(angle[:, None] * [0.0, 0.0, 1.0]).apply(self.position_N)
+
+
+#: What positions are taken for by mistake: their scale in metres, and whether the axes turn with the Earth.
+_READINGS = (
+    ("in kilometres, labelled metres", 1e3, False),
+    ("in metres, labelled kilometres", 1e-3, False),
+    ("in feet, labelled metres", 0.3048, False),
+    ("in Earth-fixed axes", 1.0, True),
+    ("in Earth-fixed axes and in kilometres, labelled metres", 1e3, True),
+    ("in Earth-fixed axes and in metres, labelled kilometres", 1e-3, True),
+)
+
 
 def check_above_earth(position_N: np.ndarray) -> None:
     """Raise BadInput where a position (N, 3) [m] is below the Earth's surface, or not a number."""
     nearest = float(np.min(np.linalg.norm(position_N, axis=-1), initial=np.inf))
-    if not nearest > _POLAR_RADIUS_M:  # also NaN
+    if not nearest > EARTH_POLAR_RADIUS_M:  # also NaN
         raise BadInput(
             f"the orbit passes {nearest / 1e3:.4g} km from the Earth's centre, below its surface",
             remedy="Check the unit (km labelled m?) and the origin of the positions: they count from the Earth's centre.",
@@ -180,8 +212,8 @@ def propagate(
     Returns
     -------
     position_N, velocity_N : ndarray, shape (N, 3)
-        [m], [m/s].  Integrated to 1e-10 of itself (1 cm a day).  Left out: higher harmonics (up to 1 km a day in low orbit),
-        drag (0.1 to 30 km a day at 500 to 300 km), Sun and Moon.
+        [m], [m/s].  Integrated to 5 cm a day.  Left out: higher harmonics (kilometres a day along a low orbit), drag (3 km along
+        the orbit in the first day at 500 km, 100 km at 300 km, growing as time squared), Sun and Moon.
     """
     from scipy.integrate import solve_ivp
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from .frames import terrestrial_time
 from .nodes import through_nodes
-from .orbit import EARTH_RADIUS_M
+from .orbit import EARTH_POLAR_RADIUS_M, EARTH_RADIUS_M
 
 #: IAU 2015 nominal solar radius, and the astronomical unit. [m]
 SUN_RADIUS_M, ASTRONOMICAL_UNIT_M = 6.957e8, 1.495978707e11
@@ -50,23 +50,25 @@ def sun_direction(tai_s: np.ndarray) -> np.ndarray:
 def sunlit(position_N: np.ndarray, sun: np.ndarray) -> np.ndarray:
     """Share of the Sun's disc that the Earth leaves visible: 1 in light, 0 in the umbra, between them in the penumbra.
 
-    The discs of Sun and Earth as the craft sees them overlap (Montenbruck and Gill, Satellite Orbits, eqs 3.85 to 3.94).
+    The discs of Sun and Earth as the craft sees them overlap (Montenbruck and Gill, Satellite Orbits, eqs 3.85 to 3.94).  The
+    flattened Earth is made a sphere by stretching all lengths along its axis: rays stay straight.  As a sphere it would bring
+    the shadow's edges 6 s too early and too late in a typical low orbit, 40 s where the orbit grazes the shadow.
 
     Parameters
     ----------
     position_N : ndarray, shape (N, 3)
-        From the Earth's centre, in the axes of ``sun``. [m]
+        From the Earth's centre, inertial (GCRS): z is the Earth's axis to 0.15 deg. [m]
     sun : ndarray, shape (N, 3) or (3,)
-        Unit vectors to the Sun.
+        Unit vectors to the Sun, same axes.
 
     Returns
     -------
     ndarray, shape (N,)
-        0 to 1.  The Earth is a sphere of its equatorial radius without air.  Flattening is neglected (21 km at the pole: the
-        shadow's edge comes up to 3 s early in low orbit, more where the craft grazes it), so are refraction and absorption,
-        which dim the last seconds, the darkening of the Sun's limb, and the 1.7 % by which the Sun's distance varies.
+        0 to 1.  Left out: refraction and absorption of the air, which dim the edge's last seconds, the darkening of the Sun's
+        limb, and the 1.7 % by which the Sun's distance, and so the penumbra, varies.
     """
-    r, s = np.atleast_2d(np.asarray(position_N, float)), np.asarray(sun, float)
+    stretched = np.array([1.0, 1.0, EARTH_RADIUS_M / EARTH_POLAR_RADIUS_M])
+    r, s = np.atleast_2d(np.asarray(position_N, float)) * stretched, np.asarray(sun, float) * stretched
     distance = np.linalg.norm(r, axis=1)
     a = np.arcsin(SUN_RADIUS_M / ASTRONOMICAL_UNIT_M)
     b = np.arcsin(np.minimum(EARTH_RADIUS_M / distance, 1.0))

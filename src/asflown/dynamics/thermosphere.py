@@ -9,8 +9,8 @@ from .frames import geodetic
 from .nodes import through_nodes
 from .orbit import check_above_earth
 
-#: One sigma of the model as a share of the density, with the day's own F10.7 and Ap; twice that in a storm.
-#: Emmert et al 2021, doi:10.1029/2020EA001321; empirical models agree with satellites' drag to 15 to 20 %.
+#: One sigma of the model as a share of the density, with the day's own F10.7 and Ap.  15 % of MSIS-86 (Hedin 1988); NRLMSIS 2.1
+#: was 10 % below its forerunner beside GRACE and Swarm, and up to 50 % off in storms (Guo et al 2024, doi:10.1016/j.asr.2024.05.063).
 SIGMA_SHARE = 0.2
 
 #: Nodes along the orbit: the spline of log density errs by less than 1e-3. [s]

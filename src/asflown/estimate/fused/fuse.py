@@ -190,7 +190,7 @@ def _fused(
 ) -> Fusion:
     I_B, grid = subject.known_inertia(), record.grid
     prior, too_long = _prior_for(grid, prior)
-    bodies = {j: _body(subject, record, I_B[j, j], wiener=prior == "wiener") for j in record.series}
+    bodies = {j: _body(subject, record, j, wiener=prior == "wiener") for j in record.series}
     fits = {j: fit_levels(bodies[j], record.series[j]) for j in bodies}
     motion, whole = _motion(bodies, fits, record), len(bodies) == 3
     if record.loop == "modelled" and record.command is None:
@@ -249,10 +249,13 @@ def _finer(grid: Grid, prior: str) -> Grid:
     return Grid(grid.start_ns, grid.step_s / 2, 2 * grid.count - 1)
 
 
-def _body(subject: Subject, record: Record, inertia_kgm2: float, *, wiener: bool) -> Body:
-    if record.loop == "modelled":
-        return HeldBody.under(subject.controller(), inertia_kgm2, wiener=wiener)
-    return FreeBody(inertia_kgm2=inertia_kgm2, wiener=wiener)
+def _body(subject: Subject, record: Record, j: int, *, wiener: bool) -> Body:
+    inertia = float(subject.known_inertia()[j, j])
+    if record.loop != "modelled":
+        return FreeBody(inertia_kgm2=inertia, wiener=wiener)
+    law = subject.controller()
+    believed = None if law.inertia is None else law.inertia[j]
+    return HeldBody.under(law, inertia, believed, wiener=wiener)
 
 
 def _motion(bodies: dict[int, Body], fits: dict[int, AxisFit], record: Record) -> _Motion:

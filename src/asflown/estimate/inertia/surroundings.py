@@ -14,6 +14,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
+from ..environment import levers
 
 if TYPE_CHECKING:
     from ...dynamics.orbit import Orbit
@@ -42,13 +43,8 @@ class Surroundings:
         stream = -v / np.linalg.norm(v, axis=1, keepdims=True)
         every = [np.stack([np.interp(time_s, t, u[:, j]) for j in range(3)], axis=1) for t, u in self.vectors.values()]
         every.append(np.einsum("nji,nj->ni", R, stream))
-        levers = np.concatenate([_lever(u) for u in every], axis=2)
-        return cumulative_trapezoid(R @ levers, time_s, axis=0, initial=0)
-
-
-def _lever(u: np.ndarray) -> np.ndarray:
-    """p x u = C p. (N, 3) -> (N, 3, 3)"""
-    return np.swapaxes(np.cross(np.eye(3)[None], u[:, None, :]), 1, 2)
+        columns = np.concatenate([levers(u) for u in every], axis=2)
+        return cumulative_trapezoid(R @ columns, time_s, axis=0, initial=0)
 
 
 def surroundings_of(telemetry: Telemetry, start_ns: int, orbit: Orbit) -> Surroundings:

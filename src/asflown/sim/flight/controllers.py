@@ -54,7 +54,7 @@ def wheel_loop(scenario: Scenario, now: CraftAt, off: np.ndarray) -> Loop:
             remedy="Fly a date or a craft with three independent wheels.",
         )
     a, b, c, d = _rate_filter_of(law, period, run.filter)
-    believed = now.inertia_kgm2 if run.inertia is None else tensor(run.inertia)
+    believed = law.believed_kgm2(now.inertia_kgm2) if run.inertia is None else tensor(run.inertia)
     natural = run.friction_bandwidth if run.friction_compensation else 0.0
     return Loop(
         period=period,
