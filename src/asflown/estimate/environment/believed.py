@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...craft.model import PREDICTED_SHARE
 from ...dynamics.environment import gravity_gradient_regressor
 from ...dynamics.orbit import BODIES
 from ...dynamics.rigid_body import ELEMENTS, elements_of
@@ -43,6 +44,8 @@ _SCALE_HEIGHT_M = 60e3
 _AIR_MODELLED, _AIR_ASSUMED = (0.2, 0.1), (0.3, 0.3)
 #: One sigma of the torque on facets, as a share: their areas and optical constants are seldom known better.
 _FACETS = 0.1
+#: An inertia that was inferred or assumed, without a sigma, is known no better than a predicted one.
+_GUESSED = ("inferred", "assumed", "extrapolated")
 #: One sigma of a torque rod's dipole, as a share: hysteresis and rise time. Assumed.
 _RODS = 0.05
 
@@ -203,7 +206,9 @@ def inertia_sigma(subject: Subject) -> np.ndarray:
     inertia is the sum of two of the first, a product one of the second."""
     moments = np.diag(subject.inertia_kgm2)  # type: ignore[arg-type]
     i, j = np.triu_indices(3)
-    return subject.inertia_share * np.sqrt(moments[i] * moments[j]) * np.where(i == j, 1.0, 0.5)
+    used = subject.craft.craft.mass_properties_used
+    guessed = any(m.basis in _GUESSED and m.sigma is None and m.piece != "given" for m in used)
+    return max(subject.inertia_share, PREDICTED_SHARE * guessed) * np.sqrt(moments[i] * moments[j]) * np.where(i == j, 1.0, 0.5)
 
 
 def _sunlight(craft: Craft, place: Place, sun: Seen | None, missing: str) -> Term | str:

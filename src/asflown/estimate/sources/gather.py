@@ -14,7 +14,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from ...dynamics.rigid_body import momentum_regressor
-from ...kit.doubts import Doubts, Kind, Severity
+from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput, some_of
 from ...kit.rotations import rates_between, turned_by
 from ...kit.scatter import difference_sigma, robust_sigma
@@ -185,7 +185,7 @@ def _blocks(t: np.ndarray) -> np.ndarray:
 def _course(subject: Subject) -> _Course:
     I_B = subject.known_inertia()
     tlm = subject.telemetry
-    doubts: list = []
+    doubts: list[Doubt] = []
     if not (tlm.members("wheel_rate") or tlm.has_axes("wheel_momentum")) and tlm.has_axes("control_torque"):
         names = [f"{stem}_{a}" for stem in ("body_rate", "control_torque") for a in AXES]
         if not tlm.has_axes("body_rate"):
@@ -200,7 +200,7 @@ def _course(subject: Subject) -> _Course:
         if s.rates is None:
             raise BadInput("body rates are not in the telemetry", channel="body_rate_x", remedy="Add them.")
         tai_ns, rates, each, pushed = s.tai_ns, s.rates, s.each, None
-        doubts += s.doubts
+        doubts = [*s.doubts]
     t = (tai_ns - tai_ns[0]) / NS
     R = attitude_at(tlm, tai_ns)
     turn, bias, bias_sigma = rates, np.zeros(3), _BIAS
