@@ -158,14 +158,18 @@ def sun_at_craft(telemetry: Telemetry, place: Place) -> tuple[Seen | None, str, 
     if on.sum() < _FEWEST:
         return Seen(np.zeros((len(lit), 3)), "Sun from the sun sensor: shadow throughout", np.zeros(len(lit))), "", []
     t_on, s_on = t[on], s[on] / np.linalg.norm(s[on], axis=1, keepdims=True)
-    doubts: list[Doubt] = []
+    whole = "Sun and shadow from the sun sensor"
     if place.R_NB is None:
-        u = _unit(_between(t_on, s_on, place.tai_ns))
-    else:
-        sun_N, doubts = _steady_sun(telemetry, t_on, s_on, place)
-        u = place.to_body(sun_N)
-        doubts += _sun_doubts(sun_N, model, lit, place)
-    return Seen(u, "Sun and shadow from the sun sensor", lit), "", doubts
+        return Seen(_unit(_between(t_on, s_on, place.tai_ns)), whole, lit), "", []
+    sun_N, doubts = _steady_sun(telemetry, t_on, s_on, place)
+    if not isinstance(model, str):
+        off = float(np.median(_angle(sun_N, model)))
+        if off > _SUN_OFF:
+            doubts.append(SUN_APART(off_deg=float(np.degrees(off))))
+    if place.at_earth:
+        lit, whole, found_apart = _shadow(sun_N, lit, whole, place)
+        doubts += found_apart
+    return Seen(place.to_body(sun_N), whole, lit), "", doubts
 
 
 def _modelled_sun(place: Place) -> np.ndarray | str:
@@ -190,22 +194,20 @@ def _steady_sun(telemetry: Telemetry, t: np.ndarray, s_B: np.ndarray, place: Pla
     return _unit(_between(middles, means, place.tai_ns)), doubts
 
 
-def _sun_doubts(sun_N: np.ndarray, model: np.ndarray | str, lit: np.ndarray, place: Place) -> list[Doubt]:
-    """The sensor against the date, and its shadow against the orbit's (with the Sun where the sensor has it)."""
-    doubts: list[Doubt] = []
-    if not isinstance(model, str):
-        off = float(np.median(_angle(sun_N, model)))
-        if off > _SUN_OFF:
-            doubts.append(SUN_APART(off_deg=float(np.degrees(off))))
-    if place.at_earth:
-        from ...dynamics.sun import sunlit
+def _shadow(sun_N: np.ndarray, lit: np.ndarray, whole: str, place: Place) -> tuple[np.ndarray, str, list[Doubt]]:
+    """The orbit's shadow with its penumbra where the sensor's agrees with it at the edges, else the sensor's and a doubt.
 
-        geometric = sunlit(place.position_N, sun_N) > 0.5
-        step = np.gradient(_s(place.tai_ns, place.tai_ns[0])) if len(lit) > 1 else np.ones(1)
-        dark, light = (float(np.sum(step[m])) for m in (geometric & (lit < 0.5), ~geometric & (lit > 0.5)))
-        if max(dark, light) > _EDGE_S:
-            doubts.append(SHADOW_APART(dark_s=dark, light_s=light))
-    return doubts
+    The Sun is where the sensor has it: the date need not be known."""
+    from ...dynamics.sun import sunlit
+
+    geometric = sunlit(place.position_N, sun_N)
+    step = np.gradient(_s(place.tai_ns, place.tai_ns[0])) if len(lit) > 1 else np.ones(1)
+    by_orbit, by_sensor = geometric > 0.5, lit > 0.5
+    dark, light = (float(np.sum(step[m])) for m in (by_orbit & ~by_sensor, ~by_orbit & by_sensor))
+    edges = max(int(np.sum(np.diff(by_sensor))), int(np.sum(np.diff(by_orbit))), 1)
+    if max(dark, light) <= _EDGE_S * edges:
+        return geometric, "Sun from the sun sensor, shadow from the orbit", []
+    return lit, whole, [SHADOW_APART(dark_s=dark, light_s=light)]
 
 
 def _channel(telemetry: Telemetry, stem: str) -> tuple[np.ndarray, np.ndarray] | None:

@@ -12,7 +12,7 @@ from ...kit.result import recorded
 from ..subject import PER_SPIN_INERTIA, subject_of
 from .compare import Model, compare
 from .doubts import NO_CONSTANT, fit_doubts
-from .gather import DENSITY, Arc, gather, with_harmonics
+from .gather import ALONE, DENSITY, Arc, gather, with_harmonics
 from .residual import residual_of
 from .result import Fitted, SourcesResult
 from .swing import Posterior, posterior
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 SOURCES = ("dipole", "sunlight", "drag", "constant")
 #: A constant torque is left out where the BIC is lower by this without it.
 CONSTANT_COSTS = 6.0
+#: Rounds in which the density's harmonics follow the lever, and cells of the swing's grid in them.
+_ROUNDS, _CELLS = 3, 16
 #: A component is told where the data leave less than this share of what was open before.
 _TOLD = 0.7
 
@@ -87,16 +89,27 @@ def sources(
             file=telemetry.source or None,
             remedy="Add these channels.",
         )
-    white = whitened(arc)
-    if "drag" in fitted:
-        first = posterior(white, tuple(n for n in fitted if n != "constant")).whole(white)
-        drag = arc.of("drag")
-        white = whitened(with_harmonics(arc, arc.torque[:, :, drag] @ first[drag], modelled=air is not None))
+    white = _whitened(arc, fitted, modelled=air is not None)
     models = compare(white, fitted)
     chosen: list[Doubt] = []
     if which is None and "constant" in fitted:
         fitted, chosen = _needed(white, models, fitted)
     return _result(subject, white, fitted, models, asked, chosen)
+
+
+def _whitened(arc: Arc, fitted: tuple[str, ...], modelled: bool) -> Whitened:
+    """With the density's higher harmonics, which are those of the lever found: of each axis' own first, then of the lever, again and again."""
+    if "drag" not in fitted:
+        return whitened(arc)
+    drag = arc.of("drag")
+    per_lever = arc.torque[:, :, drag]
+    # a lever as large as the torque that is seen, until one is known
+    white = whitened(with_harmonics(arc, per_lever / ALONE, modelled))
+    least = tuple(n for n in fitted if n != "constant")
+    for _ in range(_ROUNDS):
+        lever = posterior(white, least, _CELLS).whole(white)[: len(drag)][drag]
+        white = whitened(with_harmonics(arc, (per_lever @ lever)[:, :, None], modelled), white.levels)
+    return white
 
 
 def _result(

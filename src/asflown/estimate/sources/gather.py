@@ -39,10 +39,10 @@ _GAP_S = 60.0
 _BIAS = 5e-6
 #: A source alone may exert so many times the torque that is seen (rms), one sigma: sources seldom cancel to less than a third.
 ALONE = 3.0
-#: One sigma of the density's second and third harmonic over the orbit, as shares of its mean: the day's bulge is no sine. Without a model
-#: of the air, and with one.
-_HARMONICS, _HARMONICS_MODELLED = (0.1, 0.05), (0.03, 0.02)
-#: The penumbra's middle is known to this. [s]  It lasts 8 s in low orbit and longer where the craft grazes the shadow.
+#: One sigma of the density's second to fourth harmonic over the orbit, as shares of its mean: the day's bulge is no sine
+#: (studies/density_harmonics.py).  Without a model of the air; with one a fifth of it.
+_HARMONICS, _MODELLED = (0.14, 0.035, 0.03), 0.2
+#: The penumbra's middle is known to this, or to half its length where that is longer. [s]  It lasts 8 s in low orbit.
 _EDGE_S = 4.0
 
 ATTITUDE_FROM_RATES = Kind(
@@ -153,13 +153,15 @@ def gather(subject: Subject, which: Sequence[str], air: Air | None) -> Arc:
     )  # fmt: skip
 
 
-def with_harmonics(arc: Arc, lever_torque: np.ndarray, modelled: bool) -> Arc:
-    """The arc with higher harmonics of the density among its unknowns, each a torque as drag's (K, 3) that swings faster."""
+def with_harmonics(arc: Arc, drag: np.ndarray, modelled: bool) -> Arc:
+    """The arc with higher harmonics of the density among its unknowns, each a torque as drag's that swings faster.
+
+    ``drag`` (K, 3, l): torque at the mean density; of one lever, or per lever of each axis where none is known yet."""
     phase = arc.phase
     assert phase is not None
-    sizes = _HARMONICS_MODELLED if modelled else _HARMONICS
-    shares = [s * f(k * phase) for k, s in zip((2, 3), sizes, strict=True) for f in (np.cos, np.sin)]
-    torque = lever_torque[:, :, None] * np.stack(shares, axis=1)[:, None, :]
+    sizes = np.array(_HARMONICS) * (_MODELLED if modelled else 1.0)
+    shares = [s * f(k * phase) for k, s in enumerate(sizes, 2) for f in (np.cos, np.sin)]
+    torque = np.concatenate([drag * share[:, None, None] for share in shares], axis=2)
     grown = cumulative_trapezoid(arc.turn @ torque, arc.time_s, axis=0, initial=0)
     columns = tuple(Column("", f"{DENSITY} {k}", "", 1.0) for k in range(torque.shape[2]))
     Z = np.concatenate([arc.Z, np.swapaxes(arc.turn, 1, 2) @ grown], axis=2)
@@ -289,11 +291,22 @@ def _columns(subject: Subject, course: _Course, around: Environment, which: Sequ
     return tuple(columns), np.concatenate(torques, axis=2), np.concatenate(direct, axis=2)
 
 
+def _penumbra(middle: np.ndarray, lit: np.ndarray, edge: int) -> float:
+    """How long the light takes to go at an edge of the shadow; long where the craft grazes it. [s]
+
+    The Earth's flattening, which the geometry leaves out, is as wide as the penumbra."""
+    whole = np.flatnonzero((lit < 0.02) | (lit > 0.98))
+    before, after = whole[whole <= edge], whole[whole > edge]
+    first, last = (before[-1] if len(before) else 0), (after[0] if len(after) else len(lit) - 1)
+    return float(middle[last] - middle[first]) - float(np.median(np.diff(middle)))
+
+
 def _jumps(middle: np.ndarray, momentum: np.ndarray, lit: np.ndarray | None, size: float, t: np.ndarray) -> np.ndarray:
     """Variance of a step of momentum before each block: past a gap any, past the shadow's edge what the edge's place leaves open."""
     jump = np.zeros(len(middle))
     if lit is not None:
-        jump[1:] = ((np.diff(lit > 0.5)) != 0) * (_EDGE_S * size) ** 2
+        for edge in np.flatnonzero(np.diff(lit > 0.5)):
+            jump[edge + 1] = (max(_EDGE_S, 0.5 * _penumbra(middle, lit, edge)) * size) ** 2
     gaps = t[np.flatnonzero(np.diff(t) > max(_GAP_S, 6 * float(np.median(np.diff(t)))))]
     for at in gaps:
         jump[np.searchsorted(middle, at, side="right").clip(max=len(jump) - 1)] = float(np.max(momentum**2)) + 1e-300
