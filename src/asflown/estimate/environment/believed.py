@@ -121,9 +121,7 @@ def environment_of(
     tai_ns = np.asarray(tai_ns, np.int64)
     place, doubts, why = _place(subject, tai_ns)
     tlm, craft = subject.telemetry, subject.craft.craft
-    field, no_field, of_field = (
-        field_at_craft(tlm, place) if {"dipole", "rods"} & set(which) else (None, "", [])
-    )
+    field, no_field = field_at_craft(tlm, place) if {"dipole", "rods"} & set(which) else (None, "")
     sun, no_sun, of_sun = sun_at_craft(tlm, place) if "sunlight" in which else (None, "", [])
     makers = {
         "gravity-gradient": partial(_gravity, subject, place, why),
@@ -140,7 +138,7 @@ def environment_of(
         R_NB=place.R_NB,
         lit=None if sun is None else sun.share,
         phase_rad=_phase(place),
-        doubts=Doubts([*doubts, *of_field, *of_sun]),
+        doubts=Doubts([*doubts, *of_sun]),
     )
 
 

@@ -1,6 +1,6 @@
 """What surrounds a craft at any instants: field, Sun and shadow, air stream, each from the best that is known, with where it is from.
 
-A channel is preferred to a model; where both are there, the model judges the channel.
+A channel is preferred to a model; ``subject_of`` has judged it by then.
 """
 
 from __future__ import annotations
@@ -25,11 +25,8 @@ if TYPE_CHECKING:
 
 #: Fewest samples of a vector that are used.
 _FEWEST = 8
-#: Beyond these a measured direction contradicts what it is held against. [rad]  A coarse sun sensor errs by a few degrees, IGRF in low
-#: orbit by less than one.
-_SUN_OFF, _FIELD_OFF = np.radians(15), np.radians(20)
-#: The field's size is right within this factor: a wrong unit is not.
-_FIELD_SIZE = 1.5
+#: Beyond it the measured Sun does not stand still. [rad]  A coarse sun sensor errs by a few degrees.
+_SUN_OFF = np.radians(15)
 #: Shadow by the sun sensor and by geometry may differ for so long at an edge. [s]
 _EDGE_S = 60.0
 #: Longest stretch over which the Sun stands still: it moves by 1 degree a day. [s]
@@ -39,23 +36,6 @@ SUN_TURNS = Kind(
     "environment.sun-turns", Severity.SUSPECT,
     "the measured Sun does not stay where it is in inertial axes: it wanders by {off_deg:.0f} degrees (rms)",
     "Check the body axes of the sun sensor against those of the quaternion.",
-)  # fmt: skip
-SUN_APART = Kind(
-    "environment.sun-apart", Severity.SUSPECT,
-    "the measured Sun stands {off_deg:.0f} degrees from where it is on that date: the measured one is used",
-    "Check the epoch, and the axes of sun_direction and of the quaternion.",
-)  # fmt: skip
-SHADOW_APART = Kind(
-    "environment.shadow-apart", Severity.SUSPECT,
-    "the sun sensor's shadow is not the Earth's: {dark_s:.0f} s dark where orbit and Sun give light, {light_s:.0f} s light where they give "
-    "shadow. The sensor is believed",
-    "Check orbit_position and the epoch; a sun vector of zero must mean shadow, not a Sun outside the sensor's view.",
-)  # fmt: skip
-FIELD_APART = Kind(
-    "environment.field-apart", Severity.SUSPECT,
-    "the measured magnetic field is {ratio:.3g} times as strong as IGRF's at the orbit's position and {off_deg:.0f} degrees from it (medians): "
-    "the measured one is used",
-    "Check the unit of magnetic_field (nT labelled T?), its axes, the epoch and the quaternion.",
 )  # fmt: skip
 
 
@@ -106,18 +86,16 @@ def attitude_at(telemetry: Telemetry, tai_ns: np.ndarray) -> np.ndarray | None:
     return Slerp(t, rotation(q))(np.clip((tai_ns - at[0]) / NS, t[0], t[-1])).as_matrix()
 
 
-def field_at_craft(telemetry: Telemetry, place: Place) -> tuple[Seen | None, str, list[Doubt]]:
-    """Magnetic field in body axes [T]; or None and why; doubts."""
-    model = _igrf(place)
+def field_at_craft(telemetry: Telemetry, place: Place) -> tuple[Seen | None, str]:
+    """Magnetic field in body axes [T]; or None and what is missing."""
     found = _channel(telemetry, "magnetic_field")
-    if found is None:
-        if isinstance(model, str):
-            return None, f"magnetic_field_x, _y, _z ({model})", []
-        return Seen(model, "field from IGRF-14 at the orbit's position (ppigrf)", np.ones(len(model))), "", []
-    t, B = found
-    u = _between(t, B, place.tai_ns)
-    doubts = [] if isinstance(model, str) else _field_doubts(u, model)
-    return Seen(u, "field from the magnetometer", np.ones(len(u))), "", doubts
+    if found is not None:
+        u = _between(*found, place.tai_ns)
+        return Seen(u, "field from the magnetometer", np.ones(len(u))), ""
+    model = _igrf(place)
+    if isinstance(model, str):
+        return None, f"magnetic_field_x, _y, _z ({model})"
+    return Seen(model, "field from IGRF-14 at the orbit's position (ppigrf)", np.ones(len(model))), ""
 
 
 def _igrf(place: Place) -> np.ndarray | str:
@@ -132,20 +110,11 @@ def _igrf(place: Place) -> np.ndarray | str:
         return str(why.what)
 
 
-def _field_doubts(u: np.ndarray, model: np.ndarray) -> list[Doubt]:
-    size, expected = np.linalg.norm(u, axis=1), np.linalg.norm(model, axis=1)
-    ratio = float(np.median(size / expected))
-    off = float(np.median(_angle(u, model)))
-    if 1 / _FIELD_SIZE < ratio < _FIELD_SIZE and off < _FIELD_OFF:
-        return []
-    return [FIELD_APART(ratio=ratio, off_deg=float(np.degrees(off)))]
-
-
 def sun_at_craft(telemetry: Telemetry, place: Place) -> tuple[Seen | None, str, list[Doubt]]:
     """Direction to the Sun in body axes and the share of it that is lit; or None and why; doubts."""
     found = _channel(telemetry, "sun_direction")
-    model = _modelled_sun(place)
     if found is None:
+        model = _modelled_sun(place)
         if isinstance(model, str):
             return None, f"sun_direction_x, _y, _z ({model})", []
         from ...dynamics.sun import sunlit
@@ -162,13 +131,8 @@ def sun_at_craft(telemetry: Telemetry, place: Place) -> tuple[Seen | None, str, 
     if place.R_NB is None:
         return Seen(_unit(_between(t_on, s_on, place.tai_ns)), whole, lit), "", []
     sun_N, doubts = _steady_sun(telemetry, t_on, s_on, place)
-    if not isinstance(model, str):
-        off = float(np.median(_angle(sun_N, model)))
-        if off > _SUN_OFF:
-            doubts.append(SUN_APART(off_deg=float(np.degrees(off))))
     if place.at_earth:
-        lit, whole, found_apart = _shadow(sun_N, lit, whole, place)
-        doubts += found_apart
+        lit, whole = _shadow(sun_N, lit, whole, place)
     return Seen(place.to_body(sun_N), whole, lit), "", doubts
 
 
@@ -194,8 +158,8 @@ def _steady_sun(telemetry: Telemetry, t: np.ndarray, s_B: np.ndarray, place: Pla
     return _unit(_between(middles, means, place.tai_ns)), doubts
 
 
-def _shadow(sun_N: np.ndarray, lit: np.ndarray, whole: str, place: Place) -> tuple[np.ndarray, str, list[Doubt]]:
-    """The orbit's shadow with its penumbra where the sensor's agrees with it at the edges, else the sensor's and a doubt.
+def _shadow(sun_N: np.ndarray, lit: np.ndarray, whole: str, place: Place) -> tuple[np.ndarray, str]:
+    """The orbit's shadow with its penumbra where the sensor's agrees with it at the edges, else the sensor's.
 
     The Sun is where the sensor has it: the date need not be known."""
     from ...dynamics.sun import sunlit
@@ -206,8 +170,8 @@ def _shadow(sun_N: np.ndarray, lit: np.ndarray, whole: str, place: Place) -> tup
     dark, light = (float(np.sum(step[m])) for m in (by_orbit & ~by_sensor, ~by_orbit & by_sensor))
     edges = max(int(np.sum(np.diff(by_sensor))), int(np.sum(np.diff(by_orbit))), 1)
     if max(dark, light) <= _EDGE_S * edges:
-        return geometric, "Sun from the sun sensor, shadow from the orbit", []
-    return lit, whole, [SHADOW_APART(dark_s=dark, light_s=light)]
+        return geometric, "Sun from the sun sensor, shadow from the orbit"
+    return lit, whole
 
 
 def _channel(telemetry: Telemetry, stem: str) -> tuple[np.ndarray, np.ndarray] | None:
