@@ -91,7 +91,7 @@ def orbit_in(
     lost = NO_FIX(count=int(np.sum(~fixed))) if not fixed.all() else None
     tai_ns, position = tai_ns[fixed], position[fixed]
     if len(tai_ns) < FEWEST:
-        return None, "", Doubts([lost]), len(tai_ns)
+        return None, "", Doubts([] if len(tai_ns) else [lost]), len(tai_ns)
     orbit, body, doubts = _about(Orbit((tai_ns - start_ns) / NS, position), left_out)
     doubts.append(lost)
     if orbit is not None:
