@@ -66,16 +66,21 @@ def show(
               f"  {t.nominal_thrust:g} N")  # fmt: skip
     for timing, names in _by_timing(c.thrusters).items():
         print(wrapped("                ", f"delay, rise, fall {timing} ms: {', '.join(names)}"))
-    if k := c.wheel_controller:
-        print(f"  wheel controller: {k.bandwidth:g} Hz, damping {k.damping:g}, KP {k.kp_per_s:.6f} 1/s, KD {k.kd_per_s:.6f} 1/s\n"
-              f"                    {_filter(k)}, {'period not known' if k.period is None else f'every {k.period:g} s'}")  # fmt: skip
-        if (said := _fed(k)):
-            print(wrapped(" " * 20, said))
+    if c.wheel_controller:
+        _print_law(c.wheel_controller)
     for m in c.mechanisms:
         print(
             f"  mechanism {m.name}: {m.mass:g} kg at ({m.from_cm[0]:+.3f} {m.from_cm[1]:+.3f} {m.from_cm[2]:+.3f}) m from the centre of mass"
         )
     print_doubts(now.doubts)
+
+
+def _print_law(k) -> None:
+    period = "period not known" if k.period is None else f"every {k.period:g} s"
+    print(f"  wheel controller: {k.bandwidth:g} Hz, damping {k.damping:g}, KP {k.kp_per_s:.6f} 1/s, KD {k.kd_per_s:.6f} 1/s\n"
+          f"                    {_filter(k)}, {period}")  # fmt: skip
+    if said := _fed(k):
+        print(wrapped(" " * 20, said))
 
 
 def _filter(law) -> str:

@@ -233,10 +233,10 @@ class RateFilter(Described):
 class WheelController(Described):
     """Proportional-derivative control on the (filtered) rate, with what is fed forward (cover paper eqs 12, 13; see dynamics.loop).
 
-    u = J (KD (w_c - F(w)) + KD KP e)  [+ w x (J w + h)]  [+ J w_c']
+    u = D (KD (w_c - F(w)) + KD KP e)  [+ w x (J w + h)]  [+ J w_c']
 
     u the torque on the body, e the attitude's error and w_c the commanded rate, h the wheels' momentum, J the inertia that the
-    controller believes, F the rate filter."""
+    controller believes and D its diagonal, F the rate filter."""
 
     bandwidth: Frequency = Field(gt=0)
     damping: float = Field(gt=0)
@@ -390,7 +390,9 @@ class Craft(Described):
         if len(relative) > 1:
             raise ValueError("give the spin inertia of every wheel or of none")
         if relative == {True} and self.wheel_controller is not None and self.wheel_controller.inertia is not None:
-            raise ValueError("[wheel_controller] inertia needs wheels of known spin_inertia: results are per unit of it")
+            raise ValueError(
+                "[wheel_controller] inertia needs wheels of known spin_inertia: results are per unit of it"
+            )
         return self
 
     @property

@@ -18,6 +18,7 @@ from scipy.interpolate import BSpline, make_lsq_spline, make_smoothing_spline
 from scipy.spatial.transform import Rotation, Slerp
 
 from ...dynamics.loop import filtered_rate
+from ...kit.doubts import Doubts, Kind, Severity
 from ...kit.rotations import attitude_error, rates_between, rotation, turned_by
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
@@ -31,15 +32,25 @@ _QUATERNION = [f"quaternion_{m}" for m in "wxyz"]
 _COMMANDED = [f"commanded_quaternion_{m}" for m in "wxyz"]
 #: The command of a hold is smoothed over this, and over so many times the loop's own. [s], [loop times]
 _SMOOTHED_S, _LOOP_TIMES = 300.0, 50.0
+#: The craft file is contradicted where the actuators do this many times less beside the law that feeds w x H forward, or does not.
+_PLAIN = 3.0
 #: Shortest block whose mean is smoothed. [s]
 _BLOCK_S = 10.0
+
+FED_OTHERWISE = Kind(
+    "fused.fed-otherwise", Severity.CAUTION,
+    "the craft file says that the controller {said} feed w x H forward, and its actuators say otherwise: what they slowly do is taken "
+    "from the data",
+    "Correct gyroscopic under [wheel_controller], or the inertia and wheel axes.",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Command:
     """On the grid: rates, their derivative and the feed-forward on the body, (M, 3); variance of the rates and of their derivatives (2, 3).
 
-    ``source``: where the rates are from; ``gyroscopic``, ``acceleration``: what the controller feeds forward."""
+    ``source``: where the rates are from; ``gyroscopic``, ``acceleration``: what the controller feeds forward; ``doubts``: where
+    the actuators say otherwise than the craft file."""
 
     seconds: np.ndarray
     rate: np.ndarray
@@ -50,6 +61,7 @@ class Command:
     source: str
     gyroscopic: bool
     acceleration_fed: bool
+    doubts: Doubts = Doubts()
 
     def on(self, seconds: np.ndarray, values: np.ndarray, j: int) -> np.ndarray:
         return np.interp(seconds, self.seconds, values[:, j])
@@ -99,18 +111,19 @@ def command_of(
     h = np.column_stack([np.interp(at, stored[0], stored[1][:, j]) for j in range(3)])
     J = law.believed_kgm2(I_B)
     turn, push = np.cross(rate, rate @ J + h), acceleration @ J
-    gyroscopic = law.gyroscopic
-    if gyroscopic is None:
-        gyroscopic = _fed_forward(law, J, series, turn)
+    without, fed_forward = _left_over(law, J, series, turn)
+    gyroscopic = fed_forward < without if law.gyroscopic is None else law.gyroscopic
+    stated, other = (fed_forward, without) if gyroscopic else (without, fed_forward)
+    doubts = Doubts([FED_OTHERWISE(said="does" if gyroscopic else "does not")] if stated > _PLAIN * other else ())
     pushed = gyroscopic if law.acceleration is None else law.acceleration
-    damped = np.zeros_like(rate) if law.tracking else _damped(law, rate, grid.step_s) @ J
+    damped = np.zeros_like(rate) if law.tracking else _damped(law, rate, grid.step_s) * np.diag(J)
     feed = gyroscopic * turn + pushed * push + damped
     fed = cumulative_trapezoid(gyroscopic * turn + damped, at, axis=0, initial=0) + pushed * (rate - rate[0]) @ J
     for j, of_axis in series.items():
         more = _beside(of_axis, fed[:, j], at, J[j, j] * law.kd_per_s, law)
         feed[:, j], fed[:, j] = feed[:, j] + more.at(at, 1), fed[:, j] + more.at(at, 0)
         variance[1, j] += more.variance[0] / I_B[j, j] ** 2
-    return Command(at, rate, acceleration, feed, fed, variance, source, gyroscopic, pushed)
+    return Command(at, rate, acceleration, feed, fed, variance, source, gyroscopic, pushed, doubts)
 
 
 def _damped(law: WheelController, rate: np.ndarray, step_s: float) -> np.ndarray:
@@ -221,8 +234,8 @@ def _smoothing(law: WheelController, at: np.ndarray) -> tuple[int, float]:
     return max(1, round(float(at[-1]) / spacing)), max(_BLOCK_S, 2 / law.natural_frequency_rad_s)
 
 
-def _fed_forward(law: WheelController, J: np.ndarray, series, turn: np.ndarray) -> bool:
-    """Whether the actuators' mean action is nearer to what the law does with w x H fed forward than without."""
+def _left_over(law: WheelController, J: np.ndarray, series, turn: np.ndarray) -> tuple[float, float]:
+    """What the actuators do in the mean beside the law, without and with w x H fed forward. [N m]"""
     beside = np.zeros(3)
     for j, of_axis in series.items():
         row = {s.row: s for s in of_axis}
@@ -230,5 +243,4 @@ def _fed_forward(law: WheelController, J: np.ndarray, series, turn: np.ndarray) 
         line = np.polynomial.Polynomial.fit(h.seconds, h.values, 1).convert().coef
         held = J[j, j] * law.kd_per_s * law.kp_per_s * float(np.mean(e.values))
         beside[j] = -line[1] - held
-    mean = turn.mean(axis=0)
-    return bool(np.linalg.norm(beside - mean) < np.linalg.norm(beside))
+    return float(np.linalg.norm(beside)), float(np.linalg.norm(beside - turn.mean(axis=0)))

@@ -64,7 +64,12 @@ class HeldBody(Body):
 
     @classmethod
     def under(
-        cls, controller: WheelController, inertia_kgm2: float, believed_kgm2: float | None = None, *, wiener: bool = False
+        cls,
+        controller: WheelController,
+        inertia_kgm2: float,
+        believed_kgm2: float | None = None,
+        *,
+        wiener: bool = False,
     ) -> HeldBody:
         """``believed_kgm2``: the controller's moment of inertia about this axis; None: the body's own, whatever that is."""
         f, share = controller.rate_filter, 1.0 if believed_kgm2 is None else believed_kgm2 / inertia_kgm2

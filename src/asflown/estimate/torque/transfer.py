@@ -60,7 +60,8 @@ NOT_HELD = Kind(
     "torque.not-held", Severity.SUSPECT,
     "the attitude is not held still: the transfer method assumes a hold, and commanded rates and accelerations are not in the "
     "telemetry",
-    "Narrow the window to a hold with --start and --stop.",
+    "Narrow the window to a hold with --start and --stop; of a craft that turns with its orbit, say gyroscopic under "
+    "[wheel_controller].",
 )  # fmt: skip
 WHITE_NOISE_ONLY = Kind(
     "torque.white-noise-only", Severity.CAUTION,
