@@ -5,10 +5,10 @@ amplitude over root two): printed below; hence _HARMONICS in estimate/sources/ga
 """
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from asflown.dynamics.orbit import MU_EARTH
 from asflown.dynamics.thermosphere import density_at
-from scipy.spatial.transform import Rotation
 
 rng = np.random.default_rng(5)
 found = []

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..kit.digits import scaled_unit
 from ..telemetry.channels import AXES
-from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, breaks, new_figure, save, write_doubts
+from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, breaks, new_figure, save, write_doubts
 from .torque import time_scale
 
 if TYPE_CHECKING:

@@ -125,7 +125,7 @@ def environment_of(
     sun, no_sun, of_sun = sun_at_craft(tlm, place) if "sunlight" in which else (None, "", [])
     makers = {
         "gravity-gradient": partial(_gravity, subject, place, why),
-        "sunlight": partial(_sunlight, craft, place, sun, no_sun),
+        "sunlight": partial(_sunlight, craft, sun, no_sun),
         "dipole": partial(_dipole, craft, field, no_field),
         "drag": partial(_drag, craft, place, air, why),
         "rods": partial(_rods, subject, tai_ns, field, no_field),
@@ -209,7 +209,7 @@ def inertia_sigma(subject: Subject) -> np.ndarray:
     return max(subject.inertia_share, PREDICTED_SHARE * guessed) * np.sqrt(moments[i] * moments[j]) * np.where(i == j, 1.0, 0.5)
 
 
-def _sunlight(craft: Craft, place: Place, sun: Seen | None, missing: str) -> Term | str:
+def _sunlight(craft: Craft, sun: Seen | None, missing: str) -> Term | str:
     if sun is None:
         return missing
     design = sun.share[:, None, None] * levers(sun.u_B)

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     from ...craft.model import Craft
     from ...telemetry.telemetry import Telemetry
-    from ..subject import Subject
     from ..environment import Air
+    from ..subject import Subject
 
 SOURCES = ("dipole", "sunlight", "drag", "constant")
 #: A constant torque is left out where the BIC is lower by this without it.
@@ -97,18 +97,18 @@ def sources(
     return _result(subject, white, fitted, models, asked, chosen)
 
 
-def _whitened(arc: Arc, fitted: tuple[str, ...], modelled: bool) -> Whitened:
+def _whitened(arc: Arc, fitted: tuple[str, ...], *, modelled: bool) -> Whitened:
     """With the density's higher harmonics, which are those of the lever found: of each axis' own first, then of the lever, again and again."""
     if "drag" not in fitted:
         return whitened(arc)
     drag = arc.of("drag")
     per_lever = arc.torque[:, :, drag]
     # a lever as large as the torque that is seen, until one is known
-    white = whitened(with_harmonics(arc, per_lever / ALONE, modelled))
+    white = whitened(with_harmonics(arc, per_lever / ALONE, modelled=modelled))
     least = tuple(n for n in fitted if n != "constant")
     for _ in range(_ROUNDS):
         lever = posterior(white, least, _CELLS).whole(white)[: len(drag)][drag]
-        white = whitened(with_harmonics(arc, (per_lever @ lever)[:, :, None], modelled), white.levels)
+        white = whitened(with_harmonics(arc, (per_lever @ lever)[:, :, None], modelled=modelled), white.levels)
     return white
 
 

@@ -153,7 +153,7 @@ def gather(subject: Subject, which: Sequence[str], air: Air | None) -> Arc:
     )  # fmt: skip
 
 
-def with_harmonics(arc: Arc, drag: np.ndarray, modelled: bool) -> Arc:
+def with_harmonics(arc: Arc, drag: np.ndarray, *, modelled: bool) -> Arc:
     """The arc with higher harmonics of the density among its unknowns, each a torque as drag's that swings faster.
 
     ``drag`` (K, 3, l): torque at the mean density; of one lever, or per lever of each axis where none is known yet."""
