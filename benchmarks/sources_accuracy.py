@@ -50,7 +50,12 @@ def drawn(seed: int) -> dict:
         "density_swing": 0.0 if true["msis"] else rng.uniform(0.1, 0.6), "density_phase": f"{rng.uniform(-np.pi, np.pi)} rad",
     }  # fmt: skip
     if true["msis"]:
-        environment |= {"air": "msis", "f107": rng.uniform(80, 200), "f107_mean": rng.uniform(80, 200), "ap": rng.uniform(4, 30)}
+        environment |= {
+            "air": "msis",
+            "f107": rng.uniform(80, 200),
+            "f107_mean": rng.uniform(80, 200),
+            "ap": rng.uniform(4, 30),
+        }
     return true | {
         "changes": {
             "inertia": inertia(),
@@ -71,7 +76,12 @@ def one(seed: int) -> dict:
     tlm = flight.telemetry
     start = time.process_time()
     result = sources(tlm, CRAFT)
-    out = {"seed": seed, "seconds": time.process_time() - start, "msis": true["msis"], "doubts": [d.kind.id for d in result.doubts]}
+    out = {
+        "seed": seed,
+        "seconds": time.process_time() - start,
+        "msis": true["msis"],
+        "doubts": [d.kind.id for d in result.doubts],
+    }
     r = np.stack([tlm.channel(f"orbit_position_{a}").values for a in "xyz"], axis=1)
     height = np.linalg.norm(r, axis=1) - EARTH_RADIUS_M
     # the estimator's lever is at the mean density of the arc, the scenario's at the height of the start
@@ -92,8 +102,12 @@ def table(flights: list[dict]) -> None:
     for name, unit in (("dipole", "A m2"), ("sunlight", "N m"), ("drag", "N m")):
         use = [f for f in flights if name != "drag" or not f["msis"]]
         for j, axis in enumerate("xyz"):
-            pull, within, half, told = (np.array([f[name][k][j] for f in use]) for k in ("pull", "within", "half", "told"))
-            print(f"{name:12}{axis:>5}{len(use):>9}{told.mean():>7.2f}{np.sqrt(np.mean(pull**2)):>10.2f}{within.mean():>13.2f}{np.median(half):>16.2g} {unit}")
+            pull, within, half, told = (
+                np.array([f[name][k][j] for f in use]) for k in ("pull", "within", "half", "told")
+            )
+            print(
+                f"{name:12}{axis:>5}{len(use):>9}{told.mean():>7.2f}{np.sqrt(np.mean(pull**2)):>10.2f}{within.mean():>13.2f}{np.median(half):>16.2g} {unit}"
+            )
 
 
 def main() -> None:

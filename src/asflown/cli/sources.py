@@ -21,7 +21,9 @@ def sources(
     ),
     without: str = typer.Option(None, "--without", help='Those left out, as in "constant,drag".'),
     air: str = typer.Option(
-        None, "--air", help='F10.7 of the day before, its 81-day mean and Ap, for NRLMSIS: "150,145,12"; else exponential.'
+        None,
+        "--air",
+        help='F10.7 of the day before, its 81-day mean and Ap, for NRLMSIS: "150,145,12"; else exponential.',
     ),
     start: str = START,
     stop: str = STOP,
@@ -30,7 +32,9 @@ def sources(
     inertia: str = INERTIA,
     store: str = KEEP_IN,
     name: str = KEEP_AS,
-    out: Path = typer.Option(None, "--out", help="Write contributions and torque over time (.csv, .parquet), or all (.json)."),
+    out: Path = typer.Option(
+        None, "--out", help="Write contributions and torque over time (.csv, .parquet), or all (.json)."
+    ),
     plot: Path = typer.Option(None, "--plot", help="Draw contributions, their sum and the residual (SVG, PNG or PDF)."),
     json: bool = JSON,
 ) -> None:
@@ -49,7 +53,9 @@ def sources(
     if air is not None:
         three = numbers_of(air, "--air")
         if len(three) != 3 or min(three) < 0:
-            raise BadInput(f"--air {air!r} is not three numbers", remedy='Give F10.7, its 81-day mean and Ap: --air "150,145,12".')
+            raise BadInput(
+                f"--air {air!r} is not three numbers", remedy='Give F10.7, its 81-day mean and Ap: --air "150,145,12".'
+            )
         given = Air(*three)
     telemetry = job.telemetry()
     result = sources_of(telemetry, job.craft, which=_names(sources), without=_names(without) or (), air=given)

@@ -137,7 +137,7 @@ def environment_of(
         left_out={name: t for name, t in made.items() if isinstance(t, str)},
         R_NB=place.R_NB,
         lit=None if sun is None else sun.share,
-        phase_rad=_phase(place),
+        phase_rad=None if place.velocity_N is None else place.phase,
         doubts=Doubts([*doubts, *of_sun]),
     )
 
@@ -170,16 +170,6 @@ def _place(subject: Subject, tai_ns: np.ndarray) -> tuple[Place, Doubts, str]:
     return Place(tai_ns, tlm.dated, R, orbit, position, velocity, body), doubts, why
 
 
-def _phase(place: Place) -> np.ndarray | None:
-    """Angle swept since the first instant. (N,)"""
-    if place.position_N is None or place.velocity_N is None:
-        return None
-    r, v = place.position_N, place.velocity_N
-    rate = np.linalg.norm(np.cross(r, v), axis=1) / np.sum(r * r, axis=1)
-    t = (place.tai_ns - place.tai_ns[0]) / NS
-    return np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t))])
-
-
 # ---- the terms: a Term, or what is missing for it ----
 
 
@@ -206,7 +196,11 @@ def inertia_sigma(subject: Subject) -> np.ndarray:
     i, j = np.triu_indices(3)
     used = subject.craft.craft.mass_properties_used
     guessed = any(m.basis in _GUESSED and m.sigma is None and m.piece != "given" for m in used)
-    return max(subject.inertia_share, PREDICTED_SHARE * guessed) * np.sqrt(moments[i] * moments[j]) * np.where(i == j, 1.0, 0.5)
+    return (
+        max(subject.inertia_share, PREDICTED_SHARE * guessed)
+        * np.sqrt(moments[i] * moments[j])
+        * np.where(i == j, 1.0, 0.5)
+    )
 
 
 def _sunlight(craft: Craft, sun: Seen | None, missing: str) -> Term | str:
@@ -247,7 +241,8 @@ def _drag(craft: Craft, place: Place, air: Air | None, why: str) -> Term | str:
     if known is not None and density is not None:
         torque = drag_torque(craft, velocity, density)
         of_lever = _FACETS * torque[:, :, None] if known.sigma_Nm is None else design * known.sigma_Nm
-        swing = np.stack([np.ones(len(ratio)), np.cos(_phase(place)), np.sin(_phase(place))], axis=1)
+        phase = place.phase
+        swing = np.stack([np.ones(len(ratio)), np.cos(phase), np.sin(phase)], axis=1)
         sizes = np.array([shares[0], shares[1], shares[1]])
         errors = np.concatenate([of_lever, torque[:, :, None] * (swing * sizes)[:, None, :]], axis=2)
     return Term("drag", AXES, "N m", design, f"air stream from the orbit, density {source}", torque, errors)
@@ -259,9 +254,9 @@ def _density(place: Place, air: Air | None, reference: float | None):
     if air is not None and place.dated:
         from ...dynamics.thermosphere import density_at
 
-        rho = density_at(place.position_N, place.tai_s, air.f107, air.f107_mean, air.ap)
+        rho = density_at(place.position, place.tai_s, air.f107, air.f107_mean, air.ap)
         return rho / (reference or rho.mean()), rho, _AIR_MODELLED, "by NRLMSIS 2.1 (pymsis)"
-    height = np.linalg.norm(place.position_N, axis=1)
+    height = np.linalg.norm(place.position, axis=1)
     share = np.exp(-(height - height.mean()) / _SCALE_HEIGHT_M)
     share = share / share.mean()
     return share, None if reference is None else reference * share, _AIR_ASSUMED, "that falls by e over 60 km of height"

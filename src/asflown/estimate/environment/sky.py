@@ -60,6 +60,21 @@ class Place:
     def at_earth(self) -> bool:
         return self.position_N is not None and self.body == BODIES[0].name
 
+    @property
+    def position(self) -> np.ndarray:
+        """``position_N`` where the craft is known to be at the Earth."""
+        assert self.position_N is not None
+        return self.position_N
+
+    @property
+    def phase(self) -> np.ndarray:
+        """Angle gone round the orbit since the first instant, where position and velocity are known. (N,) [rad]"""
+        assert self.velocity_N is not None
+        r = self.position
+        rate = np.linalg.norm(np.cross(r, self.velocity_N), axis=1) / np.sum(r * r, axis=1)
+        steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(self.tai_ns) / NS
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
     def to_body(self, v_N: np.ndarray) -> np.ndarray:
         assert self.R_NB is not None
         return np.einsum("nji,nj->ni", self.R_NB, v_N)
@@ -105,7 +120,7 @@ def _igrf(place: Place) -> np.ndarray | str:
     from ...dynamics.magnetic_field import field_at
 
     try:
-        return place.to_body(field_at(place.position_N, place.tai_s))
+        return place.to_body(field_at(place.position, place.tai_s))
     except BadInput as why:
         return str(why.what)
 
@@ -119,7 +134,7 @@ def sun_at_craft(telemetry: Telemetry, place: Place) -> tuple[Seen | None, str, 
             return None, f"sun_direction_x, _y, _z ({model})", []
         from ...dynamics.sun import sunlit
 
-        lit = sunlit(place.position_N, model)
+        lit = sunlit(place.position, model)
         return Seen(place.to_body(model), "Sun from its ephemeris (ERFA), shadow from the orbit", lit), "", []
     t, s = found
     on = np.linalg.norm(s, axis=1) > 0.1
@@ -153,7 +168,9 @@ def _steady_sun(telemetry: Telemetry, t: np.ndarray, s_B: np.ndarray, place: Pla
     parts = np.array_split(np.arange(len(t)), count)
     means = _unit(np.array([s_N[p].mean(axis=0) for p in parts]))
     middles = np.array([t[p].mean() for p in parts])
-    off = float(np.sqrt(np.mean(np.concatenate([_angle(s_N[p], m[None]) ** 2 for p, m in zip(parts, means, strict=True)]))))
+    off = float(
+        np.sqrt(np.mean(np.concatenate([_angle(s_N[p], m[None]) ** 2 for p, m in zip(parts, means, strict=True)])))
+    )
     doubts: list[Doubt] = [SUN_TURNS(off_deg=float(np.degrees(off)))] if off > _SUN_OFF else []
     return _unit(_between(middles, means, place.tai_ns)), doubts
 
@@ -164,7 +181,7 @@ def _shadow(sun_N: np.ndarray, lit: np.ndarray, whole: str, place: Place) -> tup
     The Sun is where the sensor has it: the date need not be known."""
     from ...dynamics.sun import sunlit
 
-    geometric = sunlit(place.position_N, sun_N)
+    geometric = sunlit(place.position, sun_N)
     step = np.gradient(_s(place.tai_ns, place.tai_ns[0])) if len(lit) > 1 else np.ones(1)
     by_orbit, by_sensor = geometric > 0.5, lit > 0.5
     dark, light = (float(np.sum(step[m])) for m in (by_orbit & ~by_sensor, ~by_orbit & by_sensor))

@@ -85,7 +85,8 @@ def sources(
     fitted = tuple(n for n in asked if arc.of(n).any())
     if not fitted:
         raise BadInput(
-            "none of the sources asked for can be looked for: " + "; ".join(f"{n} needs {w}" for n, w in arc.environment.left_out.items()),
+            "none of the sources asked for can be looked for: "
+            + "; ".join(f"{n} needs {w}" for n, w in arc.environment.left_out.items()),
             file=telemetry.source or None,
             remedy="Add these channels.",
         )
@@ -149,9 +150,7 @@ def _result(
     )
 
 
-def _needed(
-    white: Whitened, models: tuple[Model, ...], fitted: tuple[str, ...]
-) -> tuple[tuple[str, ...], list[Doubt]]:
+def _needed(white: Whitened, models: tuple[Model, ...], fitted: tuple[str, ...]) -> tuple[tuple[str, ...], list[Doubt]]:
     """The sources without the constant torque where the record is better explained without it, and what that hides."""
     without = tuple(n for n in fitted if n != "constant")
     bic = {frozenset(m.sources): m.bic_above_best for m in models}
@@ -159,7 +158,7 @@ def _needed(
     if more < CONSTANT_COSTS or not without:
         return fitted, []
     names = white.arc.columns
-    kept = [(c, k) for k, c in enumerate(np.flatnonzero(posterior(white, without).kept)) if names[c].source in without]
+    kept = [(int(c), k) for k, c in enumerate(np.flatnonzero(posterior(white, without).kept)) if names[c].source in without]
     one, other = posterior(white, without), posterior(white, fitted)
     place = {int(c): k for k, c in enumerate(np.flatnonzero(other.kept))}
     wider = [(np.sqrt(other.spread[place[c], place[c]] / one.spread[k, k]), names[c]) for c, k in kept]
@@ -219,7 +218,10 @@ def _contributions(arc: Arc, theta: np.ndarray, fitted: tuple[str, ...]) -> dict
         if name == "drag":
             use |= np.array([c.name.startswith(DENSITY) for c in arc.columns])
         made[name] = arc.torque[:, :, use] @ theta[use]
-    for name, columns in (("gravity-gradient", arc.of("inertia")), ("rods", np.array([c.name == "rods" for c in arc.columns]))):
+    for name, columns in (
+        ("gravity-gradient", arc.of("inertia")),
+        ("rods", np.array([c.name == "rods" for c in arc.columns])),
+    ):
         if name in made:
             made[name] = made[name] + arc.torque[:, :, columns] @ theta[columns]
     return made

@@ -135,7 +135,11 @@ def gather(subject: Subject, which: Sequence[str], air: Air | None) -> Arc:
     around = environment_of(subject, course.tai_ns, air=air)
     t = course.seconds
     block = _blocks(t)
-    known = {t_.name: t_.torque_Nm for t_ in around.terms if t_.name in ("gravity-gradient", "rods") and t_.torque_Nm is not None}
+    known = {
+        t_.name: t_.torque_Nm
+        for t_ in around.terms
+        if t_.name in ("gravity-gradient", "rods") and t_.torque_Nm is not None
+    }
     brought = _grown(course, sum(known.values(), np.zeros((len(t), 3)))[:, :, None])[:, :, 0]
     momentum = course.momentum - brought
     size = _size(course, momentum)
@@ -194,7 +198,9 @@ def _course(subject: Subject) -> _Course:
             raise BadInput("body rates are not in the telemetry", channel="body_rate_x", remedy="Add them.")
         tai_ns, values = together(tlm, names)
         if len(tai_ns) < FEWEST:
-            raise BadInput("too few instants at which rates and control torque are known", remedy="Take a longer record.")
+            raise BadInput(
+                "too few instants at which rates and control torque are known", remedy="Take a longer record."
+            )
         rates, pushed, each = values[:, :3], values[:, 3:], np.zeros((len(tai_ns), 0, 3))
         doubts.append(ACTUATORS_TORQUE())
     else:
@@ -269,11 +275,21 @@ def _columns(subject: Subject, course: _Course, around: Environment, which: Sequ
         term = around.term(name)
         if name in which and term is not None:
             per_unit = float(np.sqrt(np.mean(np.sum(term.design**2, axis=(1, 2))) / 2))
-            add(name, list(AXES), term.unit, ALONE * size / max(per_unit, 1e-300) if name == "dipole" else ALONE * size, term.design)
+            add(
+                name,
+                list(AXES),
+                term.unit,
+                ALONE * size / max(per_unit, 1e-300) if name == "dipole" else ALONE * size,
+                term.design,
+            )
     term = around.term("drag")
     if "drag" in which and term is not None and around.phase_rad is not None:
         # the swing of the density: lever x cosine and sine of the way round the orbit (see swing)
-        for source, share in (("drag", 1.0), ("drag cos", np.cos(around.phase_rad)), ("drag sin", np.sin(around.phase_rad))):
+        for source, share in (
+            ("drag", 1.0),
+            ("drag cos", np.cos(around.phase_rad)),
+            ("drag sin", np.sin(around.phase_rad)),
+        ):
             add(source, list(AXES), "N m", ALONE * size, term.design * np.reshape(share, (-1, 1, 1)))
     if "constant" in which:
         add("constant", list(AXES), "N m", ALONE * size, np.broadcast_to(np.eye(3), (n, 3, 3)))
@@ -281,11 +297,18 @@ def _columns(subject: Subject, course: _Course, around: Environment, which: Sequ
     G = None if gravity is None else gravity.design
     add("inertia", list(gravity.labels) if gravity else [], "kg m2", inertia_sigma(subject) if gravity else [], G,
         -momentum_regressor(course.turn) if gravity else None)  # fmt: skip
-    if around.term("rods") is not None:
-        add("", ["rods"], "", 0.05, around.term("rods").design)
+    rods = around.term("rods")
+    if rods is not None:
+        add("", ["rods"], "", 0.05, rods.design)
     if course.each.shape[1]:
         spin = SPIN_SHARE if not subject.relative else 1e-6
-        add("", [f"spin inertia {k}" for k in range(course.each.shape[1])], "", spin, momentum=-np.swapaxes(course.each, 1, 2))
+        add(
+            "",
+            [f"spin inertia {k}" for k in range(course.each.shape[1])],
+            "",
+            spin,
+            momentum=-np.swapaxes(course.each, 1, 2),
+        )
     bias = np.broadcast_to(subject.known_inertia(), (n, 3, 3))
     add("", [f"gyro bias {a}" for a in AXES], "rad/s", course.bias_sigma, momentum=bias)
     return tuple(columns), np.concatenate(torques, axis=2), np.concatenate(direct, axis=2)
@@ -306,7 +329,7 @@ def _jumps(middle: np.ndarray, momentum: np.ndarray, lit: np.ndarray | None, siz
     jump = np.zeros(len(middle))
     if lit is not None:
         for edge in np.flatnonzero(np.diff(lit > 0.5)):
-            jump[edge + 1] = (max(_EDGE_S, 0.5 * _penumbra(middle, lit, edge)) * size) ** 2
+            jump[edge + 1] = (max(_EDGE_S, 0.5 * _penumbra(middle, lit, int(edge))) * size) ** 2
     gaps = t[np.flatnonzero(np.diff(t) > max(_GAP_S, 6 * float(np.median(np.diff(t)))))]
     for at in gaps:
         jump[np.searchsorted(middle, at, side="right").clip(max=len(jump) - 1)] = float(np.max(momentum**2)) + 1e-300

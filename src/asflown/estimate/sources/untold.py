@@ -71,4 +71,8 @@ def _why(arc: Arc, told: dict[int, Told], c: int, C: np.ndarray, looked_for: lis
     column = arc.torque[:, :, c]
     swings = np.sqrt(np.mean(np.sum(column**2, axis=1)))
     most = arc.size_Nm * 3
-    return "it exerts next to no torque here" if swings < 0.1 * most else "it changes too little over the arc beside what else is open"
+    return (
+        "it exerts next to no torque here"
+        if swings < 0.1 * most
+        else "it changes too little over the arc beside what else is open"
+    )

@@ -1,6 +1,6 @@
 """The arc whitened: momentum of an unexplained slow torque, noise of the readings, and their sizes by likelihood.
 
-    u' = R tau,   tau' = -tau / L + noise  (size s),   y = Z theta + R^T u + e
+u' = R tau,   tau' = -tau / L + noise  (size s),   y = Z theta + R^T u + e
 """
 
 from __future__ import annotations
