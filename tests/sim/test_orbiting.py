@@ -308,7 +308,7 @@ def test_law_what_is_true_may_be_drawn_and_the_craft_file_is_still_the_controlle
     B = Rotation.from_quat(flight.truth.attitude, scalar_first=True).inv().apply(flight.truth.along.field_N)
     assert flight.truth.torque_by_source_Nm["dipole"] == pytest.approx(np.cross([0.5, 0, 0], B), abs=1e-15)
     air = flight.truth.along.density_kgm3 / flown().truth.along.density_kgm3
-    assert air == pytest.approx(2.0 / 1.1)
+    assert air == pytest.approx(2.0)
 
 
 def test_law_an_orbit_by_table_is_the_same_flight(tmp_path):
@@ -340,6 +340,7 @@ def test_files_hold_the_sources(tmp_path):
         assert name in head.split(",")
     said = json.loads(files["truth_json"].read_text())["environment"]
     assert said["dipole_Am2"] == [0.27, 0.04, -0.19] and said["drag_lever_Nm"] == [1e-6, 8e-6, -1.2e-5]
+    assert said["drag_lever_at_mean_density_Nm"] == pytest.approx(said["drag_lever_Nm"])  # the exponential air's mean
     assert said["sources"] == ["gravity_gradient", "sunlight", "dipole", "drag"]
 
 
