@@ -49,7 +49,7 @@ STEPS = Kind(
     "Narrow the span (--start, --stop), or exclude it (--exclude).",
 )  # fmt: skip
 NO_CONSTANT = Kind(
-    "sources.no-constant", Severity.NOTE,
+    "sources.no-constant", Severity.CAUTION,
     "a constant torque is left out: it would explain no more than chance does (p = {p_value:.2g}). With one, {what} would be known "
     "{factor:.0f} times worse",
     "Give --sources with constant to have it in.",

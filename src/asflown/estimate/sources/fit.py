@@ -100,18 +100,20 @@ def sources(
 
 
 def _whitened(arc: Arc, fitted: tuple[str, ...], *, modelled: bool) -> Whitened:
-    """With the density's higher harmonics, which are those of the lever found: of each axis' own first, then of the lever, again and again."""
+    """With higher harmonics of drag, whichever are likelier: the density's, common to the axes and following the lever found, or such
+    of each axis' own, where what swings with the orbit is not the density alone (arrays that turn)."""
     if "drag" not in fitted:
         return whitened(arc)
     drag = arc.of("drag")
     per_lever = arc.torque[:, :, drag]
     # a lever as large as the torque that is seen, until one is known
-    white = whitened(with_harmonics(arc, per_lever / ALONE, modelled=modelled))
+    white = best = whitened(with_harmonics(arc, per_lever / ALONE, modelled=modelled))
     least = tuple(n for n in fitted if n != "constant")
     for _ in range(_ROUNDS):
         lever = posterior(white, least, _CELLS).whole(white)[: len(drag)][drag]
         white = whitened(with_harmonics(arc, (per_lever @ lever)[:, :, None], modelled=modelled), white.levels)
-    return white
+        best = min(best, white, key=lambda w: w.cost)
+    return best
 
 
 def _result(
