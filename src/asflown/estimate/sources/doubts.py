@@ -49,9 +49,9 @@ STEPS = Kind(
     "Narrow the span (--start, --stop), or exclude it (--exclude).",
 )  # fmt: skip
 NO_CONSTANT = Kind(
-    "sources.no-constant", Severity.NOTE,
-    "a constant torque is left out: the record is explained without it (BIC lower by {bic:.0f}). With one, {what} would be known {factor:.0f} "
-    "times worse",
+    "sources.no-constant", Severity.CAUTION,
+    "a constant torque is left out: it would explain no more than chance does (p = {p_value:.2g}). With one, {what} would be known "
+    "{factor:.0f} times worse",
     "Give --sources with constant to have it in.",
 )  # fmt: skip
 SIMPLER = Kind(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.stats import chi2
 
 from ...kit.doubts import Doubt, Doubts
 from ...kit.errors import BadInput, check_choice
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
     from ..subject import Subject
 
 SOURCES = ("dipole", "sunlight", "drag", "constant")
-#: A constant torque is left out where the BIC is lower by this without it.
-CONSTANT_COSTS = 6.0
+#: A constant torque is in the model where it explains more than chance would in one record of twenty (likelihood ratio).
+_BY_CHANCE = 0.05
 #: Rounds in which the density's harmonics follow the lever, and cells of the swing's grid in them.
 _ROUNDS, _CELLS = 3, 16
 #: A component is told where the data leave less than this share of what was open before.
@@ -56,7 +57,7 @@ def sources(
         Inertia, wheels; ``orbit`` where the telemetry has no positions.
     which : sequence of str, optional
         Sources looked for, of 'dipole', 'sunlight', 'drag', 'constant'; by default all whose vectors are known, the constant torque
-        only where the record asks for it (BIC).
+        only where the record asks for it (likelihood ratio, p < 0.05).
     without : sequence of str
         Sources left out.
     air : Air, optional
@@ -99,18 +100,20 @@ def sources(
 
 
 def _whitened(arc: Arc, fitted: tuple[str, ...], *, modelled: bool) -> Whitened:
-    """With the density's higher harmonics, which are those of the lever found: of each axis' own first, then of the lever, again and again."""
+    """With higher harmonics of drag, whichever are likelier: the density's, common to the axes and following the lever found, or such
+    of each axis' own, where what swings with the orbit is not the density alone (arrays that turn)."""
     if "drag" not in fitted:
         return whitened(arc)
     drag = arc.of("drag")
     per_lever = arc.torque[:, :, drag]
     # a lever as large as the torque that is seen, until one is known
-    white = whitened(with_harmonics(arc, per_lever / ALONE, modelled=modelled))
+    white = best = whitened(with_harmonics(arc, per_lever / ALONE, modelled=modelled))
     least = tuple(n for n in fitted if n != "constant")
     for _ in range(_ROUNDS):
         lever = posterior(white, least, _CELLS).whole(white)[: len(drag)][drag]
         white = whitened(with_harmonics(arc, (per_lever @ lever)[:, :, None], modelled=modelled), white.levels)
-    return white
+        best = min(best, white, key=lambda w: w.cost)
+    return best
 
 
 def _result(
@@ -151,19 +154,24 @@ def _result(
 
 
 def _needed(white: Whitened, models: tuple[Model, ...], fitted: tuple[str, ...]) -> tuple[tuple[str, ...], list[Doubt]]:
-    """The sources without the constant torque where the record is better explained without it, and what that hides."""
+    """The sources without the constant torque where it explains no more than chance would, and what that hides."""
     without = tuple(n for n in fitted if n != "constant")
     bic = {frozenset(m.sources): m.bic_above_best for m in models}
-    more = bic[frozenset(fitted)] - bic[frozenset(without)]
-    if more < CONSTANT_COSTS or not without:
+    if not without:
+        return fitted, []
+    free = int(white.arc.of("constant").sum())
+    gain = bic[frozenset(without)] - bic[frozenset(fitted)] + free * np.log(white.kept.sum())
+    chance = float(chi2.sf(gain, free))
+    if chance < _BY_CHANCE:
         return fitted, []
     names = white.arc.columns
     kept = [(int(c), k) for k, c in enumerate(np.flatnonzero(posterior(white, without).kept)) if names[c].source in without]
     one, other = posterior(white, without), posterior(white, fitted)
     place = {int(c): k for k, c in enumerate(np.flatnonzero(other.kept))}
-    wider = [(np.sqrt(other.spread[place[c], place[c]] / one.spread[k, k]), names[c]) for c, k in kept]
+    with_it, without_it = np.diag(other.spread), np.diag(one.spread)
+    wider = [(np.sqrt(with_it[place[c]] / without_it[k]), names[c]) for c, k in kept]
     factor, column = max(wider, key=lambda w: w[0])
-    return without, [NO_CONSTANT(bic=more, factor=float(factor), what=words(column))]
+    return without, [NO_CONSTANT(p_value=chance, factor=float(factor), what=words(column))]
 
 
 def _told(arc: Arc, found: Posterior) -> dict[int, Told]:

@@ -317,7 +317,7 @@ def _columns(subject: Subject, course: _Course, around: Environment, which: Sequ
 def _penumbra(middle: np.ndarray, lit: np.ndarray, edge: int) -> float:
     """How long the light takes to go at an edge of the shadow; long where the craft grazes it. [s]
 
-    The Earth's flattening, which the geometry leaves out, is as wide as the penumbra."""
+    Refraction and absorption, which the geometry leaves out, dim light that passes as low as the penumbra is wide."""
     whole = np.flatnonzero((lit < 0.02) | (lit > 0.98))
     before, after = whole[whole <= edge], whole[whole > edge]
     first, last = (before[-1] if len(before) else 0), (after[0] if len(after) else len(lit) - 1)
