@@ -57,7 +57,8 @@ class HeldBody(Body):
     STATES: ClassVar[int] = _STATES
     RATE: ClassVar[int] = _RATE
     STORED: ClassVar[int] = _STORED
-    SPREAD: ClassVar[tuple[float, ...]] = (1.5, 0.8, 0.7, 0.7, 0.7, 1.0, 0.7, 1.5)
+    # lengths of a torque: from a thruster's seconds to an orbit
+    SPREAD: ClassVar[tuple[float, ...]] = (1.5, 1.2, 0.7, 0.7, 0.7, 1.0, 0.7, 1.5)
 
     @classmethod
     def under(cls, controller: WheelController, inertia_kgm2: float, *, wiener: bool = False) -> HeldBody:
