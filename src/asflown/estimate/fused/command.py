@@ -37,7 +37,8 @@ _BLOCK_S = 10.0
 class Command:
     """On the grid: rates, their derivative and the feed-forward on the body, (M, 3); variance of the rates and of their derivatives (2, 3).
 
-    ``source``: where the rates are from; ``gyroscopic``, ``acceleration``: what the controller feeds forward."""
+    ``beside_Nm``: (3,), one sigma of what the actuators slowly do beside the law, which is in the feed-forward; ``source``: where
+    the rates are from; ``gyroscopic``, ``acceleration``: what the controller feeds forward."""
 
     seconds: np.ndarray
     rate: np.ndarray
@@ -45,6 +46,7 @@ class Command:
     feed_Nm: np.ndarray
     fed_Nms: np.ndarray  # its integral
     variance: np.ndarray
+    beside_Nm: np.ndarray
     source: str
     gyroscopic: bool
     acceleration_fed: bool
@@ -102,11 +104,12 @@ def command_of(
     pushed = gyroscopic if law.acceleration is None else law.acceleration
     feed = gyroscopic * turn + pushed * push
     fed = gyroscopic * cumulative_trapezoid(turn, at, axis=0, initial=0) + pushed * (rate - rate[0]) @ I_B
+    beside = np.zeros(3)
     for j, of_axis in series.items():
         more = _beside(of_axis, fed[:, j], at, I_B[j, j] * law.kd_per_s, law)
         feed[:, j], fed[:, j] = feed[:, j] + more.at(at, 1), fed[:, j] + more.at(at, 0)
-        variance[1, j] += more.variance[0] / I_B[j, j] ** 2
-    return Command(at, rate, acceleration, feed, fed, variance, source, gyroscopic, pushed)
+        beside[j] = np.sqrt(more.variance[0])
+    return Command(at, rate, acceleration, feed, fed, variance, beside, source, gyroscopic, pushed)
 
 
 def _commanded(subject: Subject, grid: Grid, series, law: WheelController):

@@ -35,6 +35,7 @@ from .gather import CannotFuse, Record, gather, needed
 from .held_body import HeldBody
 from .innovations import Innovations, by_channel, considered_doubts, innovation_doubts
 from .levels import AxisFit, fit_doubts, fit_levels
+from .series import MOMENTUM
 from .smooth_torque import gaussian_torque, widened
 from .turning import COMMAND_SMOOTHED, CommandNotKnown, check_turn
 
@@ -52,6 +53,8 @@ CONSIDERED = {
 #: Torques drawn from the posterior.
 PATHS = 400
 _SEED = 20160913
+#: Directions of the inertia's uncertainty that move the torque by less than this share of the largest are left out.
+_COUNTS = 1e-3
 
 TOO_LONG_FOR_CORNERS = Kind(
     "fused.too-long-for-corners", Severity.NOTE,
@@ -126,29 +129,63 @@ class _Motion:
 class _Coupling:
     """What a model of one axis leaves out, on the grid, (M, 3): w x H and the products of inertia's torque.
 
-    ``variance``: of w x H, by the rates' uncertainty; that of H does not matter."""
+    ``variance``: of w x H, by the rates' uncertainty; that of H does not matter.  ``unsure_Nm``: (M, 3, K), by what it is off for one
+    sigma of each element of the inertia.  ``beside_Nm``: (3,), one sigma of what the actuators do beside the law."""
 
     torque_Nm: np.ndarray
     variance: np.ndarray
     momentum_Nms: np.ndarray
+    unsure_Nm: np.ndarray
+    beside_Nm: np.ndarray
 
     @classmethod
-    def of(cls, motion: _Motion, I_B: np.ndarray, command: Command | None = None, *, whole: bool) -> _Coupling:
-        """``whole``: all axes' motion is known; else no torque is taken off."""
+    def of(
+        cls, motion: _Motion, I_B: np.ndarray, share: float, command: Command | None = None, *, whole: bool
+    ) -> _Coupling:
+        """``share``: one sigma of the inertia; ``whole``: all axes' motion is known; else no torque is taken off."""
         H = motion.rate @ I_B + motion.stored_Nms
-        torque = np.zeros_like(H)
+        torque, unsure = np.zeros_like(H), np.zeros((*H.shape, 0))
         if whole:
             torque = motion.acceleration @ (I_B - np.diag(np.diag(I_B))) + np.cross(motion.rate, H)
+            unsure = _by_inertia(motion, I_B, share)
         variance = motion.rate_variance @ (np.mean(H**2, axis=0) * (1 - np.eye(3)))
+        beside = np.zeros(3)
         if command is not None:
             variance = variance + command.variance[1] * np.diag(I_B) ** 2
             torque += command.acceleration * np.diag(I_B) - command.feed_Nm
-        return cls(torque, variance, H)
+            beside = command.beside_Nm
+        return cls(torque, variance, H, unsure, beside)
 
     def known(self, grid: Grid, j: int) -> Known | None:
         """The torque about an axis that has to be taken off first; None for none."""
         column = self.torque_Nm[:, j]
         return (lambda t: -np.interp(t, grid.seconds, column)) if np.any(column) else None
+
+    def considered(self, grid: Grid, j: int, axis: AxisData) -> np.ndarray:
+        """What one sigma of each thing that the coupling takes as known does to an axis's measurements, (M, K)."""
+        left, size, _ = np.linalg.svd(self.unsure_Nm[:, j], full_matrices=False)  # a hold's are all alike: one will do
+        counts = size > _COUNTS * size.max(initial=0.0)
+        torques = (left * size)[:, counts].T
+        moved = [axis.response(np.interp(axis.times.seconds, grid.seconds, c)) for c in torques]
+        if self.beside_Nm[j] > 0:  # in the momentum as well as in the torque: hardly any of it is in the sum
+            wheels = np.where(axis.channel == MOMENTUM, axis.measured_s - axis.start_s, 0.0)
+            moved.append(self.beside_Nm[j] * (wheels - axis.response(np.ones(len(axis.times.seconds)))))
+        return np.column_stack(moved) if moved else axis.columns
+
+
+def _by_inertia(motion: _Motion, I_B: np.ndarray, share: float) -> np.ndarray:
+    """By what the coupling torque (M, 3, 6) is off for one sigma of each element of the inertia.
+
+    I_B off by a symmetric random matrix on both sides of its root: products by the share of the moments' geometric mean over root 2.
+    What a moment does to its own axis's acceleration is the axis's own (``Body.sensitivities``)."""
+    found = []
+    for a in range(3):
+        for b in range(a, 3):
+            E = np.zeros((3, 3))
+            E[a, b] = E[b, a] = share * np.sqrt(I_B[a, a] * I_B[b, b] / (1 if a == b else 2))
+            turned = np.cross(motion.rate, motion.rate @ E)
+            found.append(turned if a == b else turned + motion.acceleration @ E)
+    return np.stack(found, axis=2)
 
 
 def fused(
@@ -195,7 +232,7 @@ def _fused(
     motion, whole = _motion(bodies, fits, record), len(bodies) == 3
     if record.loop == "modelled" and record.command is None:
         check_turn(record.series, motion.rate, I_B, motion.stored_Nms, motion.torque_sigma_Nm)
-    coupling = _Coupling.of(motion, I_B, record.command, whole=whole)
+    coupling = _Coupling.of(motion, I_B, considered["inertia"], record.command, whole=whole)
     if whole and not record.together:
         fits = _carried(subject, axes, record, motion, fits)
     seeds = np.random.default_rng(seed).spawn(3)
@@ -203,7 +240,7 @@ def _fused(
     solved = {}
     for j in axes:
         axis = AxisData.of(bodies[j], fits[j].levels, fits[j].series, fine.seconds)
-        solved[j] = _solve(axis, coupling.known(grid, j), prior, considered, AXES[j], seeds[j])
+        solved[j] = _solve(axis, coupling, grid, prior, considered, j, seeds[j])
     torque, sigma, momentum, paths = _columns_of(solved, grid, fine, coupling)
     unexplained = Doubts(d for s in solved.values() for d in s.unexplained)
     found = [too_long, None if whole else NOT_ALL_AXES()]
@@ -303,11 +340,13 @@ def _carried(subject: Subject, axes, record: Record, motion: _Motion, fits: dict
 
 
 def _solve(
-    whole: AxisData, known: Known | None, prior: str, considered: dict[str, float], name: str, rng: np.random.Generator
-) -> _Solved:
-    """The torque of one axis at the wanted instants; ``known``: a torque to take off first."""
+    whole: AxisData, coupling: _Coupling, grid: Grid, prior: str, considered: dict[str, float], j: int,
+    rng: np.random.Generator,
+) -> _Solved:  # fmt: skip
+    """The torque of axis ``j`` at the wanted instants, the coupling to other axes taken off first."""
+    name, axis = AXES[j], whole.without_known(coupling.known(grid, j))
     sizes, columns = _sensitivities(whole, considered)
-    axis = whole.without_known(known)
+    columns = np.column_stack([columns, coupling.considered(grid, j, whole)])
     learnt = replace(axis, columns=columns if axis.body.NARROWS else columns[:, :0])
     doubts: list[Doubt] = []
     post = draw_torques(learnt, PATHS, rng) if prior == "edges" else None
@@ -322,7 +361,7 @@ def _solve(
         raise _not_fitted()
     innovations = by_channel(post.whitened, axis.channel)
     off = {
-        n: (s * float(c.mean()), s * float(c.std())) for (n, s), c in zip(sizes.items(), post.considered.T, strict=True)
+        n: (s * float(c.mean()), s * float(c.std())) for (n, s), c in zip(sizes.items(), post.considered.T, strict=False)
     }
     unexplained = innovation_doubts(name, innovations)
     doubts += unexplained + considered_doubts(name, sizes, post.considered)
