@@ -122,12 +122,12 @@ def telemetry(time_s, speeds, rate, theta) -> Telemetry:
     return Telemetry(channels, int(tai_ns[0]))
 
 
-def believed(rng, *, controller: bool = True) -> Craft:
+def believed(rng) -> Craft:
     """The craft, off by the considered sigmas."""
     share = 0.01
-    E = share * rng.standard_normal((3, 3))
-    root = np.linalg.cholesky(INERTIA)
-    I_B = INERTIA + root @ ((E + E.T) / 2) @ root.T
+    moments, axes = np.linalg.eigh(INERTIA)
+    axes = Rotation.from_rotvec(share * rng.standard_normal(3)).as_matrix() @ axes
+    I_B = axes @ np.diag(moments * (1 + share * rng.standard_normal(3))) @ axes.T
     gain, spin = 1 + 0.005 * rng.standard_normal(2), 1 + 0.0024 * rng.standard_normal()
     elements = " ".join(f"{v}" for v in (*np.diag(I_B), I_B[0, 1], I_B[0, 2], I_B[1, 2]))
     return craft_of({

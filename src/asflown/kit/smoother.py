@@ -135,13 +135,16 @@ def smooth(model: Model, data: Measurements) -> Smoothed:
 class Score:
     """Log likelihood, and its derivatives by the model's matrices.
 
-    By A (types, n, n), Q (types, n, n), R (rows,) and the covariance at the first step (n, n)."""
+    By A (types, n, n), Q (types, n, n), R (rows,) and the covariance at the first step (n, n).  ``kick``: (N, n), of an impulse on
+    each state as each step begins, the size that the data ask for over its sigma (the auxiliary residuals of de Jong and
+    Penzer, J. Am. Stat. Assoc. 93 (1998) 796)."""
 
     log_likelihood: float
     A: np.ndarray
     Q: np.ndarray
     R: np.ndarray
     covariance: np.ndarray
+    kick: np.ndarray
 
     def along(self, here: Model, there: Model) -> float:
         """Change of the log likelihood, to first order, from one model to another of the same H, neither with driven parts."""
@@ -392,10 +395,11 @@ def _backward(A, which, H, start, row, period, mean, covariances, innovation, va
 
 @jit
 def _slopes(A, which, H, rows, start, row, period, mean, covariances, innovation, variance, product, origin):
-    """Derivatives of the log likelihood by A, Q, R and the first covariance; ``_backward``'s passage without its smoothed covariances."""
+    """Derivatives of the log likelihood by A, Q, R and the first covariance, and ``Score.kick``; ``_backward``'s passage without its smoothed covariances."""
     steps, n = mean.shape
     phases = max(period, 1)
     by_A, by_Q, by_R, first = np.zeros(A.shape), np.zeros(A.shape), np.zeros(rows), np.zeros((n, n))
+    kick = np.zeros((steps, n))
     weight = np.empty(len(row))
     # of the next period's steps: information from beyond, the same with the step's own, and N A P
     past, whole, crossed = np.zeros((phases, n, n)), np.zeros((phases, n, n)), np.zeros((phases, n, n))
@@ -445,13 +449,15 @@ def _slopes(A, which, H, rows, start, row, period, mean, covariances, innovation
             for c in range(n):
                 into[r, c] += 0.5 * (adjoint[r] * adjoint[c] - whole[phase, r, c])
             later[r] = adjoint[r]
+            if whole[phase, r, r] > 0:
+                kick[k, r] = -adjoint[r] / np.sqrt(whole[phase, r, r])
         if k > 0:
             _apply(back[which[k]], adjoint, line)
             if not again:
                 _sandwich(back[which[k]], N, turned, work)
                 N, turned = turned, N
                 settled = 0 < period <= steps - k and _same_matrix(N, past[(k - 1) % phases])
-    return by_A, by_Q, by_R, first
+    return by_A, by_Q, by_R, first, kick
 
 
 @jit

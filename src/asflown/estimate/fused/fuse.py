@@ -29,7 +29,7 @@ from ...kit.smoother import smooth
 from ...telemetry.channels import AXES
 from ..subject import INERTIA_SHARE, SPIN_SHARE, Grid, Subject
 from .body import AxisData, Body, Known
-from .corners import COARSEST_S, draw_torques, spacing_s
+from .corners import all_candidates, draw_torques
 from .free_body import FreeBody
 from .gather import CannotFuse, Record, gather, needed
 from .held_body import HeldBody
@@ -56,11 +56,6 @@ _SEED = 20160913
 #: Directions of the inertia's uncertainty that move the torque by less than this share of the largest are left out.
 _COUNTS = 1e-3
 
-TOO_LONG_FOR_CORNERS = Kind(
-    "fused.too-long-for-corners", Severity.NOTE,
-    "the record of {duration_s:.0f} s is too long to look for corners in: a smooth torque is taken, which rounds sharp peaks",
-    "Narrow the window with --start and --stop.",
-)  # fmt: skip
 NOT_ALL_AXES = Kind(
     "fused.gyroscopic-not-taken-off", Severity.CAUTION,
     "w x H and the products of inertia are not taken off, since not all axes have body rates: they are in the torque",
@@ -176,13 +171,13 @@ class _Coupling:
 def _by_inertia(motion: _Motion, I_B: np.ndarray, share: float) -> np.ndarray:
     """By what the coupling torque (M, 3, 6) is off for one sigma of each element of the inertia.
 
-    I_B off by a symmetric random matrix on both sides of its root: products by the share of the moments' geometric mean over root 2.
+    Principal moments are off by the share, principal axes by as many radians: a product by the share of the moments' difference.
     What a moment does to its own axis's acceleration is the axis's own (``Body.sensitivities``)."""
     found = []
     for a in range(3):
         for b in range(a, 3):
             E = np.zeros((3, 3))
-            E[a, b] = E[b, a] = share * np.sqrt(I_B[a, a] * I_B[b, b] / (1 if a == b else 2))
+            E[a, b] = E[b, a] = share * (I_B[a, a] if a == b else np.hypot(I_B[a, a] - I_B[b, b], I_B[a, b]))
             turned = np.cross(motion.rate, motion.rate @ E)
             found.append(turned if a == b else turned + motion.acceleration @ E)
     return np.stack(found, axis=2)
@@ -199,12 +194,11 @@ def fused(
 ) -> Fusion:
     """The torque about some axes.
 
-    ``prior``: one of PRIORS, or None: edges, but matern in a record too long for it.  ``loop``: one of
+    ``prior``: one of PRIORS, or None: edges.  ``loop``: one of
     ``gather.LOOPS``, or None: modelled where that is possible and explains the data no worse than measured.
     ``considered``: sigmas in place of some of CONSIDERED.
 
-    Raises CannotFuse where body rates, actuators or inertia are missing and what ``gather`` raises, BadInput for edges in a
-    record of more than 100 minutes (at 1 s)."""
+    Raises CannotFuse where body rates, actuators or inertia are missing and what ``gather`` raises."""
     with needed():
         subject.known_inertia()
     sizes = CONSIDERED | {"inertia": subject.inertia_share} | (considered or {})
@@ -226,7 +220,7 @@ def _fused(
     subject: Subject, record: Record, axes, prior: str | None, considered: dict[str, float], seed: int
 ) -> Fusion:
     I_B, grid = subject.known_inertia(), record.grid
-    prior, too_long = _prior_for(grid, prior)
+    prior = prior or "edges"
     bodies = {j: _body(subject, record, I_B[j, j], wiener=prior == "wiener") for j in record.series}
     fits = {j: fit_levels(bodies[j], record.series[j]) for j in bodies}
     motion, whole = _motion(bodies, fits, record), len(bodies) == 3
@@ -243,7 +237,7 @@ def _fused(
         solved[j] = _solve(axis, coupling, grid, prior, considered, j, seeds[j])
     torque, sigma, momentum, paths = _columns_of(solved, grid, fine, coupling)
     unexplained = Doubts(d for s in solved.values() for d in s.unexplained)
-    found = [too_long, None if whole else NOT_ALL_AXES()]
+    found = [None if whole else NOT_ALL_AXES()]
     for j, s in solved.items():
         found += [*fit_doubts(AXES[j], fits[j]), *s.doubts]
     start_s = float(grid.from_epoch(subject.telemetry)[0])
@@ -266,22 +260,9 @@ def _followed(command: Command | None) -> dict:
     return {"command": command.source, "feed_forward": fed}
 
 
-def _prior_for(grid: Grid, prior: str | None) -> tuple[str, Doubt | None]:
-    """The prior to take; the doubt that the default would be another in a shorter record."""
-    duration = float(grid.seconds[-1])
-    if spacing_s(duration, grid.step_s) <= max(COARSEST_S, grid.step_s):
-        return prior or "edges", None
-    if prior == "edges":
-        raise BadInput(
-            f"the record of {duration:.0f} s is too long to look for corners in",
-            remedy="Narrow it with --start and --stop, or use --prior matern.",
-        )
-    return prior or "matern", None if prior else TOO_LONG_FOR_CORNERS(duration_s=duration)
-
-
 def _finer(grid: Grid, prior: str) -> Grid:
     """The grid of candidate corners: twice as fine where the record is short enough, since a true one lies between two."""
-    if prior != "edges" or spacing_s(float(grid.seconds[-1]), grid.step_s / 2) > grid.step_s / 2 * (1 + 1e-9):
+    if prior != "edges" or not all_candidates(2 * grid.count - 1):
         return grid
     return Grid(grid.start_ns, grid.step_s / 2, 2 * grid.count - 1)
 

@@ -124,7 +124,7 @@ def _most_probable(body: Body, centre: Levels, start: Levels, series, known: Kno
         return -value + 0.5 * z @ z, z - spread * slope
 
     z = (start.logs() - middle) / spread
-    found = optimize.minimize(cost, z, method="L-BFGS-B", jac=True, bounds=[(-4.0, 4.0)] * len(z), options=_ENDS)
+    found = optimize.minimize(cost, z, method="L-BFGS-B", jac=True, bounds=[(-6.0, 6.0)] * len(z), options=_ENDS)
     return kind.from_logs(middle + spread * found.x)
 
 
