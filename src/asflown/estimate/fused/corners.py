@@ -154,7 +154,9 @@ class _Search:
 
     def lines(self, coefficients: np.ndarray) -> np.ndarray:
         """Torques (K, N) of coefficients (K, C), without roughness."""
-        return np.delete(coefficients, np.s_[2 : self.fixed], axis=1) @ self.basis.T
+        chosen = np.delete(coefficients, np.s_[2 : self.fixed], axis=1)
+        used = np.any(chosen, axis=0)  # most are in no set that was drawn
+        return chosen[:, used] @ self.basis[:, used].T
 
     def walk(
         self,
@@ -178,7 +180,8 @@ class _Search:
     def torques(self, ways: list[_Way], value: np.ndarray, drawn: _Walked) -> np.ndarray:
         """Torques (K, N) of draws given the measurements (M,), their roughness drawn too."""
         body, torque = self.axis.body, self.lines(drawn.bends)
-        residual = value[:, None] - self.seen @ drawn.bends.T
+        used = np.any(drawn.bends, axis=0)
+        residual = value[:, None] - self.seen[:, used] @ drawn.bends[:, used].T
         for k, way in enumerate(ways):
             mine = drawn.which == k
             if way.rough and mine.any():

@@ -34,7 +34,7 @@ from .free_body import FreeBody
 from .gather import CannotFuse, Record, gather, needed
 from .held_body import HeldBody
 from .innovations import Innovations, by_channel, considered_doubts, innovation_doubts
-from .levels import AxisFit, fit_doubts, fit_levels
+from .levels import AxisFit, fit_doubts, fit_levels, unfitted
 from .series import MOMENTUM
 from .smooth_torque import gaussian_torque, widened
 from .turning import COMMAND_SMOOTHED, CommandNotKnown, check_turn
@@ -222,10 +222,13 @@ def _fused(
     I_B, grid = subject.known_inertia(), record.grid
     prior = prior or "edges"
     bodies = {j: _body(subject, record, I_B[j, j], wiener=prior == "wiener") for j in record.series}
+    whole, still = len(bodies) == 3, record.loop == "modelled" and record.command is None
+    if still:  # a turn that counts is seen before the levels are fitted, and need not be fitted twice
+        _check_turn(record, _motion(bodies, {j: unfitted(bodies[j], record.series[j]) for j in bodies}, record), I_B)
     fits = {j: fit_levels(bodies[j], record.series[j]) for j in bodies}
-    motion, whole = _motion(bodies, fits, record), len(bodies) == 3
-    if record.loop == "modelled" and record.command is None:
-        check_turn(record.series, motion.rate, I_B, motion.stored_Nms, motion.torque_sigma_Nm)
+    motion = _motion(bodies, fits, record)
+    if still:
+        _check_turn(record, motion, I_B)
     coupling = _Coupling.of(motion, I_B, considered["inertia"], record.command, whole=whole)
     if whole and not record.together:
         fits = _carried(subject, axes, record, motion, fits)
@@ -251,6 +254,10 @@ def _fused(
         {AXES[j]: replace(s.data, start_s=start_s) for j, s in solved.items()},
         record.loop, unexplained, settings, record.doubts + found,
     )  # fmt: skip
+
+
+def _check_turn(record: Record, motion: _Motion, I_B: np.ndarray) -> None:
+    check_turn(record.series, motion.rate, I_B, motion.stored_Nms, motion.torque_sigma_Nm)
 
 
 def _followed(command: Command | None) -> dict:

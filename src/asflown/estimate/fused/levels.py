@@ -84,6 +84,11 @@ def fit_levels(body: Body, series: list[Series], known: Known | None = None) -> 
     return AxisFit(levels, tuple(series), count - sum(len(s.values) for s in series), offsets)
 
 
+def unfitted(body: Body, series: list[Series]) -> AxisFit:
+    """At levels from the series alone."""
+    return AxisFit(body.starting_levels(series), tuple(series), 0, {})
+
+
 def _without_outliers(body: Body, levels: Levels, series, known: Known | None, limit: float):
     """The series less what lies beyond ``limit``, worst first; as they are where there is nothing, or too much."""
     kept, most = series, _MOST_OUTLYING * sum(len(s.values) for s in series)
