@@ -29,6 +29,7 @@ from estimate.linear_loop import respond
 from flights import CASSINI, changed, flown, only, scaled, without
 
 BODY = HeldBody.under(CASSINI.wheel_controller, 5226.0)
+LOOP = [0, 1, 4, 5, 6, 7]  # its states of attitude, rate and rate filter
 LEVELS = LoopLevels(0.01, 15, 2e-6, 1e-3, 5e-6, 8e-6, 15, 3e-4)
 
 
@@ -61,8 +62,7 @@ def test_law_one_axis_model_is_the_loop_of_the_papers():
 
     F, _ = BODY.dynamics(LEVELS)
     F[1, 8] = 1
-    loop = [0, 1, 4, 5, 6, 7]  # attitude, rate and the rate filter
-    A, b = F[np.ix_(loop, loop)], F[loop, 8] / 5226.0  # torque enters per unit inertia
+    A, b = F[np.ix_(LOOP, LOOP)], F[LOOP, 8] / 5226.0  # torque enters per unit inertia
     num, den = error_per_torque(CASSINI.wheel_controller, 5226.0)
     for f in (1 / 480, 1 / 60, 0.03, 0.1):
         s = 2j * np.pi * f
@@ -81,7 +81,7 @@ def test_law_a_delay_turns_the_phase_of_what_the_wheels_do():
             f.natural_frequency**2 / (s**2 + 2 * f.damping * f.natural_frequency * s + f.natural_frequency**2)
         ) ** 2
         late = k.kd_per_s * (k.kp_per_s + lowpass * s) * np.exp(-0.1 * s)
-        attitude = np.linalg.solve(s * np.eye(6) - F[:6, :6], np.eye(6)[1])[0]
+        attitude = np.linalg.solve(s * np.eye(6) - F[np.ix_(LOOP, LOOP)], np.eye(6)[1])[0]
         effect = abs((s**2 + late * np.exp(0.1 * s)) / (s**2 + late) - 1)
         assert abs(attitude * (s**2 + late) - 1) < 0.1 * effect
 

@@ -50,6 +50,8 @@ _CANDIDATES, _COARSE = 1200, 60
 _RAMPS_S = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 #: Beta prior of the share of instants of a long record that are edges: one in ten minutes, to a factor of e. [s]
 _EDGE_PRIOR = (1.0, 600.0)
+#: Usual size of an edge, as a share of the slow torque's; the sizes are Cauchy, so that large ones are as welcome.
+_EDGE_SHARE = 0.1
 #: Proposals for each candidate instant, the fewest in all, and the share thrown away.
 _PROPOSALS, _LEAST_PROPOSALS, _BURN_IN = 50, 30_000, 0.4
 #: Chains whose draws are put together: one alone may stay with few corners and much roughness, or many and little.
@@ -118,7 +120,7 @@ class _Search:
         ramps = np.clip((t[:, None] - at_s) / long_s + 0.5, 0.0, 1.0)
         begin = np.searchsorted(t, at_s - long_s / 2)
         begin = np.minimum.accumulate(begin[::-1])[::-1]  # must not fall: a few steps of zeros more
-        return cls._of(axis, ramps, begin, axis.levels.torque_Nm**2, each_s, _EDGE_PRIOR, rng)
+        return cls._of(axis, ramps, begin, (_EDGE_SHARE * axis.levels.torque_Nm) ** 2, each_s, _EDGE_PRIOR, rng)
 
     @classmethod
     def _of(cls, axis: AxisData, shapes, begin, variance: float, each_s: np.ndarray, prior, rng: Generator) -> _Search:
