@@ -73,6 +73,17 @@ CORNERS_DO_NOT_EXPLAIN = Kind(
 )  # fmt: skip
 
 
+CHAINS_APART = Kind(
+    "fused.chains-apart", Severity.SUSPECT,
+    "the chains that look for corners about {axis} do not agree (R-hat {r_hat:.2f}, {draws:.0f} effective draws): other corners "
+    "explain the data as well, and the band is widened by that",
+    "Use --prior matern to see a smooth torque, or narrow the window with --start and --stop.",
+)  # fmt: skip
+#: Chains do not agree above this R-hat, or with fewer effective draws.  With the few hundred of a usual event the largest R-hat of many
+#: instants is above 1.01 by chance; below this its share of the band is a few percent.
+_APART, _FEW = 1.1, 40
+
+
 @dataclass(frozen=True)
 class Fusion:
     """The torque by the fused method, body axes; NaN for axes not asked for.
@@ -352,11 +363,19 @@ def _solve(
         n: (s * float(c.mean()), s * float(c.std())) for (n, s), c in zip(sizes.items(), post.considered.T, strict=False)
     }
     unexplained = innovation_doubts(name, innovations)
-    doubts += unexplained + considered_doubts(name, sizes, post.considered)
+    doubts += unexplained + considered_doubts(name, sizes, post.considered) + _apart(name, post.settings)
     wanted = axis.times.wanted
     return _Solved(
         post.mean[wanted], post.paths[:, wanted], post.peak_scale, off, innovations, unexplained, post.settings, doubts, learnt
     )  # fmt: skip
+
+
+def _apart(name: str, found: dict) -> list[Doubt]:
+    """Whether chains, if there were any, lie apart."""
+    draws = min(found.get("effective_bulk", np.inf), found.get("effective_tail", np.inf))
+    if found.get("r_hat", 1.0) <= _APART and draws >= _FEW:
+        return []
+    return [CHAINS_APART(axis=name, r_hat=found["r_hat"], draws=draws)]
 
 
 def _sensitivities(axis: AxisData, considered: dict[str, float]) -> tuple[dict[str, float], np.ndarray]:

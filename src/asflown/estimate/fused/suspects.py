@@ -44,7 +44,7 @@ class Suspects:
 def suspects(axis: AxisData) -> Suspects:
     """Of an axis whose known torque is taken off."""
     levels, edges, cost = axis.levels, np.empty(0), _cost(axis, axis.levels, np.empty(0))
-    for most in (_AT_ONCE, _AT_ONCE, _AT_ONCE, 1):
+    for most in (_AT_ONCE, _AT_ONCE, 1):
         smoother = replace(levels, torque_Nm=levels.torque_Nm / _SMOOTHER)
         seconds, size = _kicks(axis, smoother, edges, _APART_S)
         more = seconds[size > _EDGE][:most]
@@ -97,6 +97,6 @@ def _between(axis: AxisData, start: Levels, edges: np.ndarray) -> tuple[Levels, 
         return replace(start, torque_Nm=float(np.exp(p[0])), length_s=float(np.exp(p[1])))
 
     corners = start.logs()[:2] + np.array([[0, 0], [0.7, 0], [0, 0.5]])
-    how = {"maxfev": 45, "xatol": 0.05, "fatol": 0.2, "initial_simplex": corners}
+    how = {"maxfev": 25, "xatol": 0.05, "fatol": 0.2, "initial_simplex": corners}
     found = optimize.minimize(lambda p: _cost(axis, of(p), edges), corners[0], method="Nelder-Mead", options=how)
     return of(found.x), float(found.fun)
