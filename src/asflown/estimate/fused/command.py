@@ -1,8 +1,9 @@
 """The motion that the controller follows, and the torque it adds to follow it.
 
 Of a body at rate w = w_c + d, w_c commanded, I d' = T - w x H - I w_c' + u.  The controller's u is that of a hold on the
-deviation d, plus a feed-forward f that is known from w_c and H: with h + integral of f in place of the wheels' momentum h,
-and w x H + I w_c' - f taken off as a known torque, the model of a hold serves for any motion.
+deviation d, plus an f that is known from w_c and H: what it feeds forward, and, where it does not track the commanded rate,
+what that makes of its damping.  With h + integral of f in place of the wheels' momentum h, and w x H + I w_c' - f taken off as
+a known torque, the model of a hold serves for any motion.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import BSpline, make_lsq_spline, make_smoothing_spline
 from scipy.spatial.transform import Rotation, Slerp
 
+from ...dynamics.loop import filtered_rate
+from ...kit.doubts import Doubts, Kind, Severity
 from ...kit.rotations import attitude_error, rates_between, rotation, turned_by
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
@@ -29,8 +32,17 @@ _QUATERNION = [f"quaternion_{m}" for m in "wxyz"]
 _COMMANDED = [f"commanded_quaternion_{m}" for m in "wxyz"]
 #: The command of a hold is smoothed over this, and over so many times the loop's own. [s], [loop times]
 _SMOOTHED_S, _LOOP_TIMES = 300.0, 50.0
+#: The craft file is contradicted where the actuators do this many times less beside the law that feeds w x H forward, or does not.
+_PLAIN = 3.0
 #: Shortest block whose mean is smoothed. [s]
 _BLOCK_S = 10.0
+
+FED_OTHERWISE = Kind(
+    "fused.fed-otherwise", Severity.CAUTION,
+    "the craft file says that the controller {said} feed w x H forward, and its actuators say otherwise: what they slowly do is taken "
+    "from the data",
+    "Correct gyroscopic under [wheel_controller], or the inertia and wheel axes.",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -38,7 +50,8 @@ class Command:
     """On the grid: rates, their derivative and the feed-forward on the body, (M, 3); variance of the rates and of their derivatives (2, 3).
 
     ``beside_Nm``: (3,), one sigma of what the actuators slowly do beside the law, which is in the feed-forward; ``source``: where
-    the rates are from; ``gyroscopic``, ``acceleration``: what the controller feeds forward."""
+    the rates are from; ``gyroscopic``, ``acceleration``: what the controller feeds forward; ``doubts``: where the actuators say
+    otherwise than the craft file."""
 
     seconds: np.ndarray
     rate: np.ndarray
@@ -50,6 +63,7 @@ class Command:
     source: str
     gyroscopic: bool
     acceleration_fed: bool
+    doubts: Doubts = Doubts()
 
     def on(self, seconds: np.ndarray, values: np.ndarray, j: int) -> np.ndarray:
         return np.interp(seconds, self.seconds, values[:, j])
@@ -97,19 +111,27 @@ def command_of(
     rate, acceleration, variance, source = _commanded(subject, grid, series, law)
     at = grid.seconds
     h = np.column_stack([np.interp(at, stored[0], stored[1][:, j]) for j in range(3)])
-    turn, push = np.cross(rate, rate @ I_B + h), acceleration @ I_B
-    gyroscopic = law.gyroscopic
-    if gyroscopic is None:
-        gyroscopic = _fed_forward(law, I_B, series, turn)
+    J = law.believed_kgm2(I_B)
+    turn, push = np.cross(rate, rate @ J + h), acceleration @ J
+    without, fed_forward = _left_over(law, J, series, turn)
+    gyroscopic = fed_forward < without if law.gyroscopic is None else law.gyroscopic
+    stated, other = (fed_forward, without) if gyroscopic else (without, fed_forward)
+    doubts = Doubts([FED_OTHERWISE(said="does" if gyroscopic else "does not")] if stated > _PLAIN * other else ())
     pushed = gyroscopic if law.acceleration is None else law.acceleration
-    feed = gyroscopic * turn + pushed * push
-    fed = gyroscopic * cumulative_trapezoid(turn, at, axis=0, initial=0) + pushed * (rate - rate[0]) @ I_B
+    damped = np.zeros_like(rate) if law.tracking else _damped(law, rate, grid.step_s) * np.diag(J)
+    feed = gyroscopic * turn + pushed * push + damped
+    fed = cumulative_trapezoid(gyroscopic * turn + damped, at, axis=0, initial=0) + pushed * (rate - rate[0]) @ J
     beside = np.zeros(3)
     for j, of_axis in series.items():
-        more = _beside(of_axis, fed[:, j], at, I_B[j, j] * law.kd_per_s, law)
+        more = _beside(of_axis, fed[:, j], at, J[j, j] * law.kd_per_s, law)
         feed[:, j], fed[:, j] = feed[:, j] + more.at(at, 1), fed[:, j] + more.at(at, 0)
         beside[j] = np.sqrt(more.variance[0])
-    return Command(at, rate, acceleration, feed, fed, variance, beside, source, gyroscopic, pushed)
+    return Command(at, rate, acceleration, feed, fed, variance, beside, source, gyroscopic, pushed, doubts)
+
+
+def _damped(law: WheelController, rate: np.ndarray, step_s: float) -> np.ndarray:
+    """What a law that does not track does against the commanded rates (M, 3), per unit inertia."""
+    return -law.kd_per_s * np.column_stack([filtered_rate(law, rate[:, j], step_s) for j in range(3)])
 
 
 def _commanded(subject: Subject, grid: Grid, series, law: WheelController):
@@ -215,14 +237,13 @@ def _smoothing(law: WheelController, at: np.ndarray) -> tuple[int, float]:
     return max(1, round(float(at[-1]) / spacing)), max(_BLOCK_S, 2 / law.natural_frequency_rad_s)
 
 
-def _fed_forward(law: WheelController, I_B: np.ndarray, series, turn: np.ndarray) -> bool:
-    """Whether the actuators' mean action is nearer to what the law does with w x H fed forward than without."""
+def _left_over(law: WheelController, J: np.ndarray, series, turn: np.ndarray) -> tuple[float, float]:
+    """What the actuators do in the mean beside the law, without and with w x H fed forward. [N m]"""
     beside = np.zeros(3)
     for j, of_axis in series.items():
         row = {s.row: s for s in of_axis}
         h, e = row[MOMENTUM], row[ATTITUDE_ERROR]
         line = np.polynomial.Polynomial.fit(h.seconds, h.values, 1).convert().coef
-        held = I_B[j, j] * law.kd_per_s * law.kp_per_s * float(np.mean(e.values))
+        held = J[j, j] * law.kd_per_s * law.kp_per_s * float(np.mean(e.values))
         beside[j] = -line[1] - held
-    mean = turn.mean(axis=0)
-    return bool(np.linalg.norm(beside - mean) < np.linalg.norm(beside))
+    return float(np.linalg.norm(beside)), float(np.linalg.norm(beside - turn.mean(axis=0)))

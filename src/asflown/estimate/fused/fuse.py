@@ -232,7 +232,7 @@ def _fused(
 ) -> Fusion:
     I_B, grid = subject.known_inertia(), record.grid
     prior = prior or "edges"
-    bodies = {j: _body(subject, record, I_B[j, j], wiener=prior == "wiener") for j in record.series}
+    bodies = {j: _body(subject, record, j, wiener=prior == "wiener") for j in record.series}
     whole, still = len(bodies) == 3, record.loop == "modelled" and record.command is None
     if still:  # a turn that counts is seen before the levels are fitted, and need not be fitted twice
         _check_turn(record, _motion(bodies, {j: unfitted(bodies[j], record.series[j]) for j in bodies}, record), I_B)
@@ -285,10 +285,13 @@ def _finer(grid: Grid, prior: str) -> Grid:
     return Grid(grid.start_ns, grid.step_s / 2, 2 * grid.count - 1)
 
 
-def _body(subject: Subject, record: Record, inertia_kgm2: float, *, wiener: bool) -> Body:
-    if record.loop == "modelled":
-        return HeldBody.under(subject.controller(), inertia_kgm2, wiener=wiener)
-    return FreeBody(inertia_kgm2=inertia_kgm2, wiener=wiener)
+def _body(subject: Subject, record: Record, j: int, *, wiener: bool) -> Body:
+    inertia = float(subject.known_inertia()[j, j])
+    if record.loop != "modelled":
+        return FreeBody(inertia_kgm2=inertia, wiener=wiener)
+    law = subject.controller()
+    believed = None if law.inertia is None else law.inertia[j]
+    return HeldBody.under(law, inertia, believed, wiener=wiener)
 
 
 def _motion(bodies: dict[int, Body], fits: dict[int, AxisFit], record: Record) -> _Motion:

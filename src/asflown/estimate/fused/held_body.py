@@ -4,10 +4,11 @@ One axis has ten states: attitude and rate of the body; the wheels' momentum; th
 estimate, which the controller flies on; the rate filter's four, where there is one; the torque and its slope.
 
     attitude'  = rate
-    I rate'    = T + u + w_u                     u = I KD (KP e - F(rate)),   e = -(attitude + error)
+    I rate'    = T + u + w_u                     u = J KD (KP e - F(rate)),   e = -(attitude + error)
     h'         = -u - w_u
     error'     = -error/time + w_a               a Gauss-Markov process
 
+J is the moment of inertia that the controller believes: the body's own, unless the craft file says otherwise.
 w_u is what the wheels do beside their command (gyro noise in the loop, friction, a cycle of delay): it
 moves body and wheels oppositely, so total momentum never feels it.  Measured are e, the rate and h.
 """
@@ -46,13 +47,15 @@ class LoopLevels(Levels):
 class HeldBody(Body):
     """A body whose controller is known.
 
-    ``filter_rad_s``: infinite where the rate is not filtered.  ``delay_s``: of the loop beyond its rate filter, to first order; zero but for asking what a delay would do."""
+    ``kd_per_s``: per unit of the body's inertia.  ``believes``: whether the controller's own inertia is stated, so that an error
+    of the body's changes its gains.  ``filter_rad_s``: infinite where the rate is not filtered.  ``delay_s``: of the loop beyond its rate filter, to first order; zero but for asking what a delay would do."""
 
     kp_per_s: float
     kd_per_s: float
     filter_rad_s: float
     filter_damping: float
     delay_s: float = 0.0
+    believes: bool = False
 
     RATE: ClassVar[int] = _RATE
     STORED: ClassVar[int] = _STORED
@@ -60,11 +63,20 @@ class HeldBody(Body):
     SPREAD: ClassVar[tuple[float, ...]] = (1.5, 1.2, 0.7, 0.7, 0.7, 1.0, 0.7, 1.5)
 
     @classmethod
-    def under(cls, controller: WheelController, inertia_kgm2: float, *, wiener: bool = False) -> HeldBody:
-        f = controller.rate_filter
+    def under(
+        cls,
+        controller: WheelController,
+        inertia_kgm2: float,
+        believed_kgm2: float | None = None,
+        *,
+        wiener: bool = False,
+    ) -> HeldBody:
+        """``believed_kgm2``: the controller's moment of inertia about this axis; None: the body's own, whatever that is."""
+        f, share = controller.rate_filter, 1.0 if believed_kgm2 is None else believed_kgm2 / inertia_kgm2
         return cls(
-            inertia_kgm2=inertia_kgm2, wiener=wiener, kp_per_s=controller.kp_per_s, kd_per_s=controller.kd_per_s,
+            inertia_kgm2=inertia_kgm2, wiener=wiener, kp_per_s=controller.kp_per_s, kd_per_s=share * controller.kd_per_s,
             filter_rad_s=f.natural_frequency if f else np.inf, filter_damping=f.damping if f else 1.0,
+            believes=believed_kgm2 is not None,
         )  # fmt: skip
 
     @property
@@ -103,7 +115,9 @@ class HeldBody(Body):
             F[stage + 1, [source, stage, stage + 1]] = w**2, -(w**2), -2 * z * w
 
     def sensitivities(self, axis: AxisData, best: Smoothed) -> dict[str, np.ndarray]:
-        """The response to the torque under other numbers; per unit inertia the loop has the craft's own gains."""
+        """The response to the torque under other numbers.
+
+        Per unit of the body's inertia the loop has the craft's own gains, but where the controller's inertia is stated."""
         torque = self.inertia_kgm2 * best.mean[:, self.torque]
         here = axis.response(torque)
         stored = axis.channel == MOMENTUM
@@ -115,7 +129,8 @@ class HeldBody(Body):
         found = {
             name: (replace(axis, body=other).response(torque) - here) / step for name, (step, other) in changes.items()
         }
-        return found | {"inertia": np.where(stored, 0.0, -here), "spin_inertia": np.where(stored, here, 0.0)}
+        inertia = np.where(stored, 0.0, -here) - (found["kd"] if self.believes else 0.0)
+        return found | {"inertia": inertia, "spin_inertia": np.where(stored, here, 0.0)}
 
     def measured(self, v: LoopLevels) -> tuple[np.ndarray, np.ndarray]:
         H = np.zeros((len(ROWS), self.states))
