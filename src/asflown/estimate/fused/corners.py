@@ -57,8 +57,8 @@ _EDGE_SHARE = 0.1
 _PROPOSALS, _LEAST_PROPOSALS, _BURN_IN = 50, 30_000, 0.4
 #: Chains whose draws are put together: one alone may stay with few corners and much roughness, or many and little.
 _CHAINS = 4
-#: Proposals of a walk, in units of the usual: once, and again where that was not enough.
-_EFFORTS = (1, 10)
+#: In a long record chains that lie further apart than this walk again, with so many times the proposals.
+_FAR, _FURTHER = 1.05, 6
 #: Chains have met below this R-hat; the furthest that widens a band.
 _MET, _FURTHEST = 1.01, 5.0
 #: Draws of a chain for each that is used, to see whether chains have met; at how many instants that is looked at.
@@ -267,7 +267,7 @@ def _in_long(axis: AxisData, wanted: np.ndarray, count: int, rng: Generator) -> 
     search = _Search.of_ramps(replace(axis, levels=found.levels), at, length, each, rng)
     ways = [search.way(found.levels.torque_Nm, found.levels.length_s)]
     start = [search.fixed + int(np.argmin(np.abs(at - t) + np.abs(np.log(length / 8.0)))) for t in found.edges]
-    walked = _walked(search, ways, np.ones(1), np.unique(np.array(start, np.int64)), count)
+    walked = _walked(search, ways, np.ones(1), np.unique(np.array(start, np.int64)), count, (1, _FURTHER), _FAR)
     drawn = walked.drawn
     torque = search.torques(ways, axis.data.value, drawn)
     settings = {
@@ -316,11 +316,13 @@ def _ways(search: _Search, count: int) -> tuple[list[_Way], np.ndarray]:
     return ways, search.fixed + np.flatnonzero(first[-1, search.fixed :])
 
 
-def _walked(search: _Search, ways: list[_Way], prior, found: np.ndarray, count: int) -> _Found:
-    """Draws of all chains; given ten times as many proposals where the first do not explain the data, or have not met."""
+def _walked(
+    search: _Search, ways: list[_Way], prior, found: np.ndarray, count: int, efforts=(1, 10), apart: float = np.inf
+) -> _Found:
+    """Draws of all chains, with more proposals (``efforts``) where the first do not explain the data, or the chains lie apart."""
     own, evidence = [w.gains.own for w in ways], [w.gains.log_likelihood for w in ways]
     of_each = -(-count // _CHAINS)
-    for effort in _EFFORTS:
+    for effort in efforts:
         chains = [search.walk(ways, prior, own, evidence, found, _MORE * of_each, effort) for _ in range(_CHAINS)]
         met = worst(search.quantities(chains))
         drawn = _Walked(
@@ -329,7 +331,7 @@ def _walked(search: _Search, ways: list[_Way], prior, found: np.ndarray, count: 
         usual = int(np.bincount(drawn.which).argmax())
         left = own[usual] - ways[usual].columns @ drawn.bends[drawn.which == usual].mean(axis=0)
         explained = bool(np.mean(left**2) < max(1, np.mean(own[-1] ** 2)) + _UNEXPLAINED * math.sqrt(2 / len(left)))
-        if explained:
+        if explained and met.r_hat < apart:
             break
     return _Found(drawn, left, explained, met)
 
