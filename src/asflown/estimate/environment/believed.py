@@ -197,10 +197,13 @@ def _gravity(subject: Subject, place: Place, why: str) -> Term | str:
 
 
 def inertia_sigma(subject: Subject) -> np.ndarray:
-    """One sigma of the six elements (6,): the share stated, of each moment; of a product, that share of its two moments' mean."""
-    I = np.diag(subject.inertia_kgm2)  # type: ignore[arg-type]
+    """One sigma of the six elements (6,): the share stated, of each moment; of a product half that share of its two moments' mean.
+
+    Half: errors of the mass's second moments that favour no axes have sigma s in the diagonal and s / sqrt(2) beside it; a moment of
+    inertia is the sum of two of the first, a product one of the second."""
+    moments = np.diag(subject.inertia_kgm2)  # type: ignore[arg-type]
     i, j = np.triu_indices(3)
-    return subject.inertia_share * np.sqrt(I[i] * I[j])
+    return subject.inertia_share * np.sqrt(moments[i] * moments[j]) * np.where(i == j, 1.0, 0.5)
 
 
 def _sunlight(craft: Craft, place: Place, sun: Seen | None, missing: str) -> Term | str:
