@@ -152,7 +152,9 @@ def _steady_sun(telemetry: Telemetry, t: np.ndarray, s_B: np.ndarray, place: Pla
     parts = np.array_split(np.arange(len(t)), count)
     means = _unit(np.array([s_N[p].mean(axis=0) for p in parts]))
     middles = np.array([t[p].mean() for p in parts])
-    off = float(np.sqrt(np.mean(np.concatenate([_angle(s_N[p], m[None]) ** 2 for p, m in zip(parts, means, strict=True)]))))
+    off = float(
+        np.sqrt(np.mean(np.concatenate([_angle(s_N[p], m[None]) ** 2 for p, m in zip(parts, means, strict=True)])))
+    )
     doubts: list[Doubt] = [SUN_TURNS(off_deg=float(np.degrees(off)))] if off > _SUN_OFF else []
     return _unit(_between(middles, means, place.tai_ns)), doubts
 
