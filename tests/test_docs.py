@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from asflown.craft.model import Drag
 from asflown.sim import scenario
 from asflown.sim.mission import mission
 from asflown.telemetry import dictionary
@@ -79,7 +80,8 @@ def test_simulator_page_lists_every_scenario_key():
     models = (scenario.Scenario, scenario.Triangles, scenario.Constant, scenario.Table, scenario.Plume, scenario.Passage, scenario.Slew,
               scenario.Coast, scenario.DragSpike, scenario.CoverMotion, scenario.Controller, scenario.Sampling, scenario.Gap,
               scenario.ThrusterUse, scenario.CatalystBeds, scenario.ThrusterFault, scenario.WheelBias, scenario.Burn,
-              scenario.ThrusterControl, scenario.BranchSwap)  # fmt: skip
+              scenario.ThrusterControl, scenario.BranchSwap, scenario.OrbitFlown, scenario.Environment, scenario.Pointing,
+              scenario.Unloading, scenario.Sensors, scenario.NullSpace, scenario.DragGrowth, Drag)  # fmt: skip
     tables = {
         "slews",
         "coasts",
@@ -96,6 +98,14 @@ def test_simulator_page_lists_every_scenario_key():
         "branch_swaps",
         "wheel_biases",
         "burns",
+        "orbit",
+        "environment",
+        "pointings",
+        "unloading",
+        "sensors",
+        "null_space",
+        "drag_growth",
+        "wheel_drag",
     }  # named in the first column
     fields = {k for m in models for k in m.model_fields} - tables
     text = section(page("simulator.md"), "Scenario keys")

@@ -114,7 +114,10 @@ def test_imports_follow_the_data(room):
 
 def test_sim_takes_no_more_of_dynamics_than_the_world_flown_through():
     taken = {m[1] for p in (SRC / "sim").rglob("*.py") for m, _ in imported(p) if m[:1] == ("dynamics",)}
-    assert taken == {"flyby", "plume", "drag"}
+    assert taken == {
+        "flyby", "plume", "drag",  # bodies that are passed
+        "orbit", "frames", "magnetic_field", "sun", "thermosphere", "environment",  # the Earth, orbited
+    }  # fmt: skip
 
 
 def test_every_room_of_estimate_is_known():
