@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from ...craft.model import Craft
     from ...telemetry.telemetry import Telemetry
+    from ..subject import Subject
     from ..environment import Air
 
 SOURCES = ("dipole", "sunlight", "drag", "constant")
@@ -90,42 +91,49 @@ def sources(
     if "drag" in fitted:
         first = posterior(white, tuple(n for n in fitted if n != "constant")).whole(white)
         drag = arc.of("drag")
-        arc = with_harmonics(arc, arc.torque[:, :, drag] @ first[drag], modelled=air is not None)
-        white = whitened(arc)
+        white = whitened(with_harmonics(arc, arc.torque[:, :, drag] @ first[drag], modelled=air is not None))
     models = compare(white, fitted)
     chosen: list[Doubt] = []
     if which is None and "constant" in fitted:
         fitted, chosen = _needed(white, models, fitted)
+    return _result(subject, white, fitted, models, asked, chosen)
+
+
+def _result(
+    subject: Subject, white: Whitened, fitted: tuple[str, ...], models: tuple[Model, ...], asked: tuple[str, ...],
+    chosen: list[Doubt],
+) -> SourcesResult:  # fmt: skip
+    arc, around = white.arc, white.arc.environment
     found = posterior(white, fitted)
     told = _told(arc, found)
-    untold = untold_in(arc, found, told, fitted)
     theta = found.whole(white)
     residual = residual_of(white, theta)
+    doubts = [
+        *subject.doubts, *arc.doubts, *chosen, *fit_doubts(white, arc, theta, residual, models, fitted),
+        PER_SPIN_INERTIA(what="the torque is") if subject.relative else None,
+    ]  # fmt: skip
     return SourcesResult(
         craft=subject.craft.craft.name,
-        epoch=telemetry.epoch_label,
+        epoch=subject.telemetry.epoch_label,
         method="momentum",
         found={n: _fitted(arc, found, told, n) for n in fitted},
         inertia=_fitted(arc, found, told, "inertia") if arc.of("inertia").any() else None,
         swing=_swing(found) if "drag" in fitted else None,
         correlations=_correlations(arc, found),
-        time_s=telemetry.seconds(arc.tai_ns),
+        time_s=subject.telemetry.seconds(arc.tai_ns),
         contributions=_contributions(arc, theta, fitted),
-        lit=None if arc.environment.lit is None else np.interp(arc.tai_ns, arc.environment.tai_ns, arc.environment.lit),
+        lit=None if around.lit is None else np.interp(arc.tai_ns, around.tai_ns, around.lit),
         phase_rad=arc.phase,
         residual=residual,
         size_Nm=arc.size_Nm,
-        untold=untold,
+        untold=untold_in(arc, found, told, fitted),
         models=models,
         relative=subject.relative,
-        where_from={t.name: t.source for t in arc.environment.terms},
-        left_out={n: w for n, w in arc.environment.left_out.items() if n in asked or n == "gravity-gradient"},
+        where_from={t.name: t.source for t in around.terms},
+        left_out={n: w for n, w in around.left_out.items() if n in asked or n == "gravity-gradient"},
         settings=_settings(white),
-        doubts=Doubts([
-            *subject.doubts, *arc.doubts, *chosen, *fit_doubts(white, arc, theta, residual, models, fitted),
-            PER_SPIN_INERTIA(what="the torque is") if subject.relative else None,
-        ]),
-    )  # fmt: skip
+        doubts=Doubts(doubts),
+    )
 
 
 def _needed(
