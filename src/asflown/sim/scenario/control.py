@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from ...craft.model import Hertz, InertiaElements, NewtonMetre, Second, _in
+from ...craft.model import Frequency, InertiaElements, NewtonMetre, Second, _in
 from ..plans import Part
 from .units import _by_name
 
@@ -26,7 +26,7 @@ class Controller(Part):
     delay_cycles: int = Field(default=0, ge=0, le=8)
     filter: Literal["tustin", "zoh"] = "tustin"
     inertia: InertiaElements | None = None  # what the controller believes; the craft file's unless given
-    bandwidth: Hertz | None = Field(default=None, gt=0)  # the craft's own unless given, as the damping
+    bandwidth: Frequency | None = Field(default=None, gt=0)  # the craft's own unless given, as the damping
     damping: float | None = Field(default=None, gt=0)
     gyroscopic_feedforward: bool | None = None  # the craft's; true where its file does not say
     acceleration_feedforward: bool | None = None
