@@ -30,7 +30,7 @@ def section(text: str, heading: str) -> str:
 def keys_in(text: str) -> set[str]:
     """Words in code marks in the key column (the second) of the tables."""
     rows = [line.split(" | ") for line in text.splitlines() if line.startswith("|")]
-    return {k for cells in rows if len(cells) > 2 for k in re.findall(r"`([a-z_]+)`", cells[1])}
+    return {k for cells in rows if len(cells) > 2 for k in re.findall(r"`([a-z_][a-z0-9_]*)`", cells[1])}
 
 
 def code_blocks(text: str, language: str) -> list[str]:
@@ -110,7 +110,7 @@ def test_simulator_page_lists_every_scenario_key():
     fields = {k for m in models for k in m.model_fields} - tables
     text = section(page("simulator.md"), "Scenario keys")
     assert keys_in(text) == fields
-    assert all(re.search(rf"\[[a-z.\[]*{t}\]", text) for t in tables | {"torques"})
+    assert all(re.search(rf"\[[a-z.\[]*{t}[\].]", text) for t in tables | {"torques"})
 
 
 def test_simulator_page_lists_every_mission_key():

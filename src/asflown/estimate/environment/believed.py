@@ -167,7 +167,7 @@ def _place(subject: Subject, tai_ns: np.ndarray) -> tuple[Place, Doubts, str]:
 
         position, velocity = flown(craft.orbit, tai_ns / NS)
         orbit, body, why = Orbit(t, position), BODIES[0].name, ""
-        doubts = doubts + [carried(craft.orbit.epoch, tai_ns)]
+        doubts = Doubts([*doubts, carried(craft.orbit.epoch, tai_ns)])
     R = attitude_at(tlm, tai_ns)
     return Place(tai_ns, tlm.dated, R, orbit, position, velocity, body), doubts, why
 

@@ -54,7 +54,7 @@ def wheel_loop(scenario: Scenario, now: CraftAt, off: np.ndarray) -> Loop:
             remedy="Fly a date or a craft with three independent wheels.",
         )
     a, b, c, d = _rate_filter_of(law, period, run.filter)
-    believed = law.believed_kgm2(now.inertia_kgm2) if run.inertia is None else tensor(run.inertia)
+    believed = law.believed_kgm2(np.asarray(now.inertia_kgm2, float)) if run.inertia is None else tensor(run.inertia)
     natural = run.friction_bandwidth if run.friction_compensation else 0.0
     return Loop(
         period=period,
@@ -69,6 +69,7 @@ def wheel_loop(scenario: Scenario, now: CraftAt, off: np.ndarray) -> Loop:
         delay_cycles=run.delay_cycles,
         gyroscopic_feedforward=_first_known(run.gyroscopic_feedforward, law.gyroscopic),
         acceleration_feedforward=_first_known(run.acceleration_feedforward, law.acceleration),
+        tracking=_first_known(run.tracking, law.tracking),
         **_sets_of_wheels(axes, off, run.null_space),
         null_rate=_null_rates(scenario, now),
         torque_limit=np.array([np.inf if w.torque_limit is None else w.torque_limit for w in now.wheels]),

@@ -100,6 +100,7 @@ class Loop(NamedTuple):
     delay_cycles: int
     gyroscopic_feedforward: bool
     acceleration_feedforward: bool
+    tracking: bool  # the rate's error is against the commanded rate, else against none
     turning: np.ndarray  # (N,), which of the sets of wheels below turns the craft in each cycle
     axes_inverse: np.ndarray  # (p, n, 3), pseudo-inverse of a set's axes, zero rows for wheels not in it
     from_outside: np.ndarray  # (p,) bool, what a coasting wheel would have given comes from outside
@@ -621,7 +622,7 @@ def fly_cycles(plant, loop, errors, thrusters, rods, coasting, q_c, w_c, alpha_c
                 s[1] = loop.filter_a[1, 0] * s[0] + loop.filter_a[1, 1] * s[1] + loop.filter_b[1] * signal
                 s[0] = s0
                 signal = out
-            c[i] = w_c[cycle, i] + loop.kp * e[i] - signal
+            c[i] = (w_c[cycle, i] if loop.tracking else 0.0) + loop.kp * e[i] - signal
         h[:] = 0.0
         for k in range(n):
             for i in range(3):

@@ -30,6 +30,7 @@ class Controller(Part):
     damping: float | None = Field(default=None, gt=0)
     gyroscopic_feedforward: bool | None = None  # the craft's; true where its file does not say
     acceleration_feedforward: bool | None = None
+    tracking: bool | None = None  # the rate's error is against the commanded one
     null_space: NullSpace | None = None
     friction_compensation: bool = False
     friction_bandwidth: _in("rad/s") = 0.3  # type: ignore[valid-type]
