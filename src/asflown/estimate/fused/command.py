@@ -49,8 +49,9 @@ FED_OTHERWISE = Kind(
 class Command:
     """On the grid: rates, their derivative and the feed-forward on the body, (M, 3); variance of the rates and of their derivatives (2, 3).
 
-    ``source``: where the rates are from; ``gyroscopic``, ``acceleration``: what the controller feeds forward; ``doubts``: where
-    the actuators say otherwise than the craft file."""
+    ``beside_Nm``: (3,), one sigma of what the actuators slowly do beside the law, which is in the feed-forward; ``source``: where
+    the rates are from; ``gyroscopic``, ``acceleration``: what the controller feeds forward; ``doubts``: where the actuators say
+    otherwise than the craft file."""
 
     seconds: np.ndarray
     rate: np.ndarray
@@ -58,6 +59,7 @@ class Command:
     feed_Nm: np.ndarray
     fed_Nms: np.ndarray  # its integral
     variance: np.ndarray
+    beside_Nm: np.ndarray
     source: str
     gyroscopic: bool
     acceleration_fed: bool
@@ -119,11 +121,12 @@ def command_of(
     damped = np.zeros_like(rate) if law.tracking else _damped(law, rate, grid.step_s) * np.diag(J)
     feed = gyroscopic * turn + pushed * push + damped
     fed = cumulative_trapezoid(gyroscopic * turn + damped, at, axis=0, initial=0) + pushed * (rate - rate[0]) @ J
+    beside = np.zeros(3)
     for j, of_axis in series.items():
         more = _beside(of_axis, fed[:, j], at, J[j, j] * law.kd_per_s, law)
         feed[:, j], fed[:, j] = feed[:, j] + more.at(at, 1), fed[:, j] + more.at(at, 0)
-        variance[1, j] += more.variance[0] / I_B[j, j] ** 2
-    return Command(at, rate, acceleration, feed, fed, variance, source, gyroscopic, pushed, doubts)
+        beside[j] = np.sqrt(more.variance[0])
+    return Command(at, rate, acceleration, feed, fed, variance, beside, source, gyroscopic, pushed, doubts)
 
 
 def _damped(law: WheelController, rate: np.ndarray, step_s: float) -> np.ndarray:
