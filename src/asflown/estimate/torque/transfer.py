@@ -62,7 +62,8 @@ NOT_HELD = Kind(
 )  # fmt: skip
 WHITE_NOISE_ONLY = Kind(
     "torque.white-noise-only", Severity.CAUTION,
-    "the band of the transfer method holds white noise only: slow (correlated) error of the attitude estimate is not in it",
+    "the band of the transfer method holds white noise and the inertia's sigma only: slow (correlated) error of the attitude estimate "
+    "is not in it",
     "Use --method fused.",
 )  # fmt: skip
 
@@ -145,6 +146,8 @@ class Transfer(Method):
             torque = -(acceleration @ I_B + push * np.diag(I_B))
         else:
             torque = -np.diag(I_B) / gain * (acceleration + push)
+        # the whole torque that the loop tells is in proportion to the inertia
+        variance = variance / gain**2 + (subject.inertia_share * torque) ** 2
         if len(channels) == 3 and tlm.members("wheel_rate") and not subject.relative:
             torque += np.cross(-rate, _wheel_momentum(subject, grid))  # in a hold the body turns at -e'
         silent = {g: name for found in inverted.values() for g, name in found.gaps.items()}
@@ -152,8 +155,8 @@ class Transfer(Method):
         told_by_error = told_by_error[np.isfinite(told_by_error).all(axis=1)]
         moves = subject.slewing or turns(tlm) or changes_as_in_a_slew(told_by_error)
         return Answer(
-            by=self, grid=grid, torque_Nm=torque, sigma_Nm=np.sqrt(variance) / gain,
-            settings={"half_width_s": width, "degree": 3, "model": self.taken},
+            by=self, grid=grid, torque_Nm=torque, sigma_Nm=np.sqrt(variance),
+            settings={"half_width_s": width, "degree": 3, "model": self.taken, "inertia_share": subject.inertia_share},
             doubts=Doubts([*gap_doubts(tlm, grid, silent), NOT_HELD() if moves else None, WHITE_NOISE_ONLY()]),
         )  # fmt: skip
 
