@@ -38,10 +38,10 @@ _PLAIN = 3.0
 _BLOCK_S = 10.0
 
 FED_OTHERWISE = Kind(
-    "fused.fed-otherwise", Severity.CAUTION,
-    "the craft file says that the controller {said} feed w x H forward, and its actuators say otherwise: what they slowly do is taken "
-    "from the data",
-    "Correct gyroscopic under [wheel_controller], or the inertia and wheel axes.",
+    "fused.fed-otherwise", Severity.SUSPECT,
+    "the craft file says that the controller {said} feed w x H forward, and its actuators contradict that: they slowly do another "
+    "thing, which is taken from the data",
+    "Check the wheels' axes and spin inertia, the inertia, and gyroscopic under [wheel_controller]: the torque is wrong if it is not this last.",
 )  # fmt: skip
 
 
