@@ -50,7 +50,7 @@ def show(
             | {"command": "craft show", "provenance": provenance(hashes(name), {"craft": name, "at": at})}
         )
         return
-    print(f"{c.name}: {c.description}" + (f", on {at}" if at else ""))
+    print(c.name + (f": {c.description}" if c.description else "") + (f", on {at}" if at else ""))
     if now.inertia_kgm2 is not None:
         print("  inertia [per unit spin inertia]" if now.relative else "  inertia [kg m2]")
         for row in now.inertia_kgm2:

@@ -57,9 +57,11 @@ def load_craft(name_or_file: str | Path, *, inertia=None, cm=None) -> Craft:
     else:
         name, _, alternative = text.partition("@")
         if name not in built_in_crafts():
+            own = f"{name}.toml"
+            there = f"the path of a TOML file: {own}" if Path(own).is_file() else "the path of a TOML file"
             raise BadInput(
                 f"no craft is named {name!r}",
-                remedy=f"Built in: {some_of(built_in_crafts())}. For your own, give the path of a TOML file.",
+                remedy=f"Built in: {some_of(built_in_crafts())}. For your own, give {there}.",
             )
         source = (_profiles() / f"{name}.toml").read_bytes()
     craft = validated(Craft, toml_table(source, name), name, "See docs/craft.md for the keys and their units.")

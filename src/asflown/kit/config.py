@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import tomllib
+from difflib import get_close_matches
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
@@ -36,18 +37,39 @@ def validated(model: type[Model], table: dict, file: object, remedy: str) -> Mod
     except BadInput as why:
         raise BadInput(why.what, file=file, channel=why.channel, remedy=why.remedy) from None
     except ValidationError as why:
-        raise BadInput(_in_words(why), file=file, remedy=remedy) from None
+        raise BadInput(_in_words(why, model), file=file, remedy=remedy) from None
 
 
-def _in_words(why: ValidationError) -> str:
+def _in_words(why: ValidationError, model: type[BaseModel]) -> str:
     said = []
     for e in why.errors()[:5]:
         where = ".".join(str(p) for p in e["loc"])
         unknown = e["type"] == "extra_forbidden"
-        kind = "unknown key" if unknown else e["msg"].removeprefix("Value error, ").split("\n")[0]
+        kind = (
+            f"unknown key{_meant(model, e['loc'])}"
+            if unknown
+            else e["msg"].removeprefix("Value error, ").split("\n")[0]
+        )
         said.append(f"{where}: {kind}" if where else kind)
     more = len(why.errors()) - 5
     return "; ".join(said) + (f"; and {more} more" if more > 0 else "")
+
+
+def _meant(model: type[BaseModel], place: tuple) -> str:
+    """The key most like an unknown one, as a question; '' where none is."""
+    tables = [model]
+    for step in place[:-1]:
+        if isinstance(step, str):
+            tables = [t for m in tables if step in m.model_fields for t in _tables_in(m.model_fields[step].annotation)]
+    near = get_close_matches(str(place[-1]), {name for t in tables for name in t.model_fields}, 1, 0.7)
+    return f" (did you mean {near[0]}?)" if near else ""
+
+
+def _tables_in(kind: object) -> list[type[BaseModel]]:
+    """Every table that a field may hold."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        return [kind]
+    return [t for part in get_args(kind) for t in _tables_in(part)]
 
 
 def changes_of(settings, option: str) -> dict:

@@ -73,14 +73,19 @@ def quantity(text: object, expected: str) -> float:
     if isinstance(text, (int, float)) and not isinstance(text, bool):
         if expected == "":
             return float(text)
-        raise BadInput(f"{text!r} has no unit", remedy=f'Write the unit in the value, as in "{text} {expected}".')
+        raise BadInput(f"{text!r} has no unit", remedy=_as_in(text, expected))
     match = _NUMBER.match(str(text))
     if not match:
         raise BadInput(f"{text!r} is not a number with a unit", remedy=f'Write it as in "1.5 {expected}".')
     number, unit = match.groups()
     if unit == "" and expected != "":
-        raise BadInput(f"{text!r} has no unit", remedy=f'Write the unit in the value, as in "{number} {expected}".')
+        raise BadInput(f"{text!r} has no unit", remedy=_as_in(number, expected))
     return _sensible(float(number) * si_factor(unit, expected), text)
+
+
+def _as_in(number: object, expected: str) -> str:
+    usual = {"rad": "deg", "rad/s": "deg/s"}.get(expected, expected)
+    return f'Write the unit in the value, as in "{number} {usual}".'
 
 
 def numbers(text: object, expected: str, count: int) -> tuple[float, ...]:

@@ -24,6 +24,7 @@ from ...kit.doubts import Doubts
 from ...kit.errors import check_choice
 from ...kit.timeline import NS
 from ...telemetry.channels import AXES
+from ..subject import OF_THE_SUN, sky_doubts
 from .orbits import carried, gravity_words, longest_gap, orbit_in, refuse_contradictions
 from .sky import Place, Seen, attitude_at, field_at_craft, rods_at, sun_at_craft
 from .term import Term, levers
@@ -123,6 +124,8 @@ def environment_of(
     tlm, craft = subject.telemetry, subject.craft.craft
     field, no_field = field_at_craft(tlm, place) if {"dipole", "rods"} & set(which) else (None, "")
     sun, no_sun, of_sun = sun_at_craft(tlm, place) if "sunlight" in which else (None, "", [])
+    if "sunlight" in which:
+        of_sun = [*of_sun, *sky_doubts(tlm, craft).of(*OF_THE_SUN)]
     makers = {
         "gravity-gradient": partial(_gravity, subject, place, why),
         "sunlight": partial(_sunlight, craft, sun, no_sun),

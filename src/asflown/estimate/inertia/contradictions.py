@@ -107,7 +107,7 @@ def _step_of_momentum(time_s: np.ndarray, residual_N: np.ndarray, arc: np.ndarra
         total = np.cumsum(residual_N[here], axis=0)[9:-10]
         before = np.arange(10, n - 9)[:, None]
         mean = residual_N[here].mean(axis=0)
-        gain = np.sum((total - before * mean) ** 2 / (before * (n - before) / n), axis=1) / max(noise, 1e-300) ** 2
+        gain = np.sum((total - before * mean) ** 2 / (before * (n - before) / n), axis=1) / max(noise, 1e-150) ** 2
         if gain.max() > best:
             j = int(np.argmax(gain)) + 10
             best, at = float(gain.max()), float(0.5 * (time_s[here[j - 1]] + time_s[here[j]]))

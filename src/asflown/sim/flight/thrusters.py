@@ -117,7 +117,7 @@ def thrusters_of(scenario: Scenario, now: CraftAt, times, period: float) -> Thru
         return no_thrusters(len(now.wheels))
     names = [t.name for t in craft.thrusters]
     law = _controller(craft)
-    thrust = use.thrust or craft.thrust_at(scenario.epoch_ns)
+    thrust = use.thrust or craft.believed_thrust(scenario.epoch_ns)
     steady = np.full((len(times), len(names)), thrust)
     leak = np.zeros_like(steady)
     for fault in scenario.thruster_faults:
@@ -211,7 +211,7 @@ def thruster_readings(truth: ThrusterTruth, scenario: Scenario, craft: Craft) ->
     warmth = hot + truth.chill * (cold - hot)
     readings |= axes_of("catbed_temperature", warmth, truth.names)
     if craft.blow_down is not None:
-        thrust = use.thrust or craft.thrust_at(scenario.epoch_ns)
+        thrust = use.thrust or craft.believed_thrust(scenario.epoch_ns)
         readings["tank_pressure"] = np.full(len(truth.on), craft.blow_down.pressure_at(thrust))
     return readings
 
@@ -241,7 +241,7 @@ OLD_THRUST = Kind(
 
 def thrust_doubts(scenario: Scenario, craft: Craft) -> Doubts:
     """What to say of a thrust taken from long before the flight."""
-    if scenario.thrusters is None or scenario.thrusters.thrust is not None:
+    if scenario.thrusters is None or scenario.thrusters.thrust is not None or not craft.thrust_history:
         return Doubts()
     last = max(h.date for h in craft.thrust_history)
     if scenario.epoch_ns - last < STALE_NS:
