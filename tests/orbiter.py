@@ -37,6 +37,7 @@ class Flight:
     drag: np.ndarray = field(default_factory=lambda: np.array([1e-6, 7e-6, -8e-6]))
     swing: float = 0.35
     swing_phase: float = 1.0
+    second: float = 0.0  # the density's second harmonic, which the model has not
     constant: np.ndarray = field(default_factory=lambda: np.zeros(3))
     inertia_error: float = 0.01
     gyro: float = 8e-6  # rad/s a sample
@@ -95,17 +96,17 @@ def attitude(f: Flight, t, r, v, rng):
 
 def torques(f: Flight, t, r, v, q):
     """By name, body axes (N, 3)."""
-    s, B = q.inv().apply(np.broadcast_to(f.sun, r.shape)), q.inv().apply(field_N(r))
+    s, B = q.inv().apply(np.tile(f.sun, (len(r), 1))), q.inv().apply(field_N(r))
     r_B, w = q.inv().apply(r), q.inv().apply(-v / np.linalg.norm(v, axis=1, keepdims=True))
     lit = light(r, np.array(f.sun))
     n = np.sqrt(MU / (R_EARTH + f.height_m) ** 3)
-    rho = 1 + f.swing * np.cos(n * t - f.swing_phase)
+    rho = 1 + f.swing * np.cos(n * t - f.swing_phase) + f.second * np.cos(2 * n * t + 1)
     return {
         "gravity-gradient": 3 * MU / (R_EARTH + f.height_m) ** 5 * np.cross(r_B, r_B @ INERTIA),
         "dipole": np.cross(f.dipole, B),
         "sunlight": lit[:, None] * np.cross(f.sunlight, s),
         "drag": rho[:, None] * np.cross(f.drag, w),
-        "constant": np.broadcast_to(f.constant, r.shape),
+        "constant": np.tile(f.constant, (len(r), 1)),
     }, B, s, lit
 
 

@@ -147,10 +147,10 @@ def coverage(result, at, torque) -> np.ndarray:
     return np.mean(np.abs(result.torque_Nm - true) <= 1.96 * result.torque_sigma_Nm, axis=0)
 
 
-def pointed(duration_s=2400.0, cadence_s=4.0, turn: Rotation | None = None, seed=2):
+def pointed(duration_s=2400.0, cadence_s=4.0, turn: Rotation | None = None, seed=2, *, yawing=True):
     """Telemetry without dynamics: attitude (nadir, slowly yawing, then turned), rates, orbit, field and Sun in body axes, wheels at rest."""
     at = np.arange(0, duration_s, cadence_s)
-    yaw = 0.4 * np.sin(2 * np.pi * at / 900)
+    yaw = 0.4 * yawing * np.sin(2 * np.pi * at / 900)
     R = nadir(at) * Rotation.from_rotvec(np.outer(yaw, [0, 0, 1]))
     turn = turn or Rotation.identity()
     R = R * turn

@@ -96,9 +96,13 @@ def words_of(turn: Rotation) -> str:
         return "0 deg"
     axis, said = v / angle, ""
     k = int(np.argmax(np.abs(axis)))
-    about = f"{'+' if axis[k] > 0 else '-'}{'xyz'[k]}" if abs(axis[k]) > 0.998 else "({:.2f}, {:.2f}, {:.2f})".format(*axis)
+    about = (
+        f"{'+' if axis[k] > 0 else '-'}{'xyz'[k]}" if abs(axis[k]) > 0.998 else "({:.2f}, {:.2f}, {:.2f})".format(*axis)
+    )
     M = turn.as_matrix()
     if np.abs(M - np.round(M)).max() < 0.1:
-        rows = [f"{'-' if row[j] < 0 else ''}{'xyz'[j]}" for row, j in zip(M, np.argmax(np.abs(M), axis=1), strict=True)]
+        rows = [
+            f"{'-' if row[j] < 0 else ''}{'xyz'[j]}" for row, j in zip(M, np.argmax(np.abs(M), axis=1), strict=True)
+        ]
         said = f", (x, y, z) -> ({', '.join(rows)})"
     return f"{np.degrees(angle):.0f} deg about {about}{said}"

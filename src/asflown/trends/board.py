@@ -33,23 +33,37 @@ def entries_in(store: str, craft: str | None, *, curves: bool) -> tuple[list[Ent
         return trends.entries(name, curves=curves), name
 
 
-def health_in(store: str, craft: str | None, kind: str, limits: list[str], **options) -> Health:
-    """The verdict on one kind; ``limits`` as in ``limits_of``, ``options`` as of ``judge``."""
-    entries, _ = entries_in(store, craft, curves=True)
+def health_in(store: str, craft: str | None, kind: str | None, limits: list[str], **options) -> Health:
+    """The verdict on one kind; ``limits`` as in ``limits_of``, ``options`` as of ``judge``.
+
+    ``kind`` None: deploys, or the only kind there is.  Raises BadInput where there are several others, and where there is none."""
+    entries, name = entries_in(store, craft, curves=True)
+    kinds = _kinds_of(entries, name)
+    if kind is None:
+        kind = MOVES[0] if MOVES[0] in kinds else kinds[0]
+        if kind not in MOVES and len(kinds) > 1:
+            raise BadInput("the store has figures of several kinds", remedy=f"Choose one with --kind: {some_of(kinds)}.")
+    elif kind not in kinds:
+        raise BadInput(f"the store has no figures of merit of kind {kind}", remedy=f"Its kinds: {some_of(kinds)}.")
     return _judged(entries, kind, limits_of(limits, entries), **options)
 
 
 def healths_in(store: str, craft: str | None, limits: list[str]) -> list[Health]:
     """Verdicts on every kind that has figures: deploys, stows, then records of other kinds.  Raises BadInput where there is none."""
     entries, name = entries_in(store, craft, curves=True)
+    limit = limits_of(limits, entries)
+    return [_judged(entries, kind, limit) for kind in _kinds_of(entries, name)]
+
+
+def _kinds_of(entries: list[Entry], name: str) -> list[str]:
+    """Kinds that have figures.  Raises BadInput where there is none."""
     kinds = [k for k in (*MOVES, *RECORDS) if any(e.kind == k and e.values for e in entries)]
     if not kinds:
         raise BadInput(
             f"the store has no figures of merit of {name}",
-            remedy="Add some with `asflown trend add`, or with --store of `asflown wheels`, `inertia`, `thrust` or `gates`.",
+            remedy="Add some with `asflown trend add`, or with --store of `asflown wheels`, `inertia`, `thrust`, `sources` or `gates`.",
         )
-    limit = limits_of(limits, entries)
-    return [_judged(entries, kind, limit) for kind in kinds]
+    return kinds
 
 
 def limits_of(texts: list[str], entries: list[Entry]) -> dict[str, float]:

@@ -8,7 +8,7 @@ from asflown.dynamics.environment import MU_EARTH
 from asflown.dynamics.frames import earth_fixed
 from asflown.dynamics.orbit import flown
 from asflown.estimate.environment import environment_of
-from asflown.estimate.environment.orbits import CARRIED
+from asflown.estimate.environment.orbits import CARRIED, NO_FIX
 from asflown.estimate.subject import subject_of
 from asflown.kit.errors import BadInput
 from asflown.kit.timeline import NS
@@ -69,3 +69,8 @@ def test_trap_elements_of_another_day_are_doubted(days, said):
     at = telemetry.channel("quaternion_w").tai_ns[::10]
     found = environment_of(subject_of(telemetry, CRAFT), at, ("gravity-gradient",))
     assert len(found.terms) == 1 and found.doubts.has(CARRIED) == said
+
+
+def test_positions_of_a_receiver_without_a_fix_are_left_out():
+    found = environment(lambda t, r: np.where(np.arange(len(t))[:, None] // 20 == 10, 0.0, r))
+    assert len(found.terms) == 2 and found.doubts.of(NO_FIX)[0].numbers["count"] == 20

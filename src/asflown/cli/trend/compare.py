@@ -15,7 +15,7 @@ def compare(
     second: str = typer.Argument(None),
     store: str = STORE,
     figure: str = FIGURE,
-    kind: str = KIND,
+    kind: str | None = KIND,
     craft: str = WHOSE,
     margin: float = typer.Option(
         15.0, "--margin", min=0.1, max=100, help="Difference within which both count as equivalent [%]."
@@ -40,7 +40,7 @@ def compare(
                 record[key] = [r for r in record[key] if r["figure"] == figure]
     if json:
         print_json({
-            "command": "trend compare", "craft": health.craft, "kind": kind, **record, **health.doubts.record(),
+            "command": "trend compare", "craft": health.craft, "kind": health.kind, **record, **health.doubts.record(),
             "provenance": provenance({}, {"store": without_password(store), "margin_percent": margin, "figure": figure}),
         })  # fmt: skip
         return

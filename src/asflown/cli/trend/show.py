@@ -16,7 +16,7 @@ def show(
     store: str = STORE,
     figure: str = FIGURE,
     basis: str = BASIS,
-    kind: str = KIND,
+    kind: str | None = KIND,
     craft: str = WHOSE,
     limit: list[str] = LIMIT,
     plot: Path = typer.Option(None, "--plot", help="Draw the figure (SVG, PNG or PDF by its suffix)."),
@@ -42,7 +42,7 @@ def show(
     if json:
         rest = {} if figure else {"figures": [figure_record(f) for f in found]}
         print_json({
-            "command": "trend show", "craft": health.craft, "kind": kind, **figure_record(found[0]), **rest,
+            "command": "trend show", "craft": health.craft, "kind": health.kind, **figure_record(found[0]), **rest,
             **health.doubts.record(),
             "provenance": provenance({}, {"store": without_password(store), "figure": figure, "basis": basis, "limit": limit}),
         })  # fmt: skip

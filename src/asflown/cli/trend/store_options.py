@@ -5,7 +5,9 @@ from __future__ import annotations
 import typer
 
 STORE = typer.Option(..., "--store", help="A path (SQLite) or a URL (sqlite:///…, postgresql://…).")
-KIND = typer.Option("deploy", "--kind", help="deploy, stow, wheels, inertia, thrust or gates.")
+KIND = typer.Option(
+    None, "--kind", help="deploy, stow, wheels, inertia, thrust, sources or gates (default: deploy, or the only one in the store)."
+)
 WHOSE = typer.Option(None, "--craft", help="One craft, where the store has several.")
 FIGURES = typer.Option(None, "--figures", help="A Python file that declares further figures of merit.")
 LIMIT = typer.Option([], "--limit", help='A figure\'s limit, as in "angular_impulse=-0.5 N m s"; may be repeated.')

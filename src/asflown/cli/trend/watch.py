@@ -14,7 +14,7 @@ def watch(
     store: str = STORE,
     figure: str = FIGURE,
     event: str = typer.Option(None, "--event", help="Judge this event, without later ones; the newest unless given."),
-    kind: str = KIND,
+    kind: str | None = KIND,
     craft: str = WHOSE,
     limit: list[str] = LIMIT,
     json: bool = JSON,
@@ -33,13 +33,13 @@ def watch(
         verdict, reasons = figures[0].verdict, list(figures[0].reasons)
     if json:
         print_json({
-            "command": "trend watch", "craft": health.craft, "kind": kind, "event": health.entries[-1].event,
+            "command": "trend watch", "craft": health.craft, "kind": health.kind, "event": health.entries[-1].event,
             "verdict": verdict, "reasons": reasons, "figures": [figure_record(f) for f in figures],
             "shape": shape_record(health), "cycles": cycles_record(health), **health.doubts.record(),
             "provenance": provenance({}, {"store": without_password(store), "figure": figure, "event": event, "limit": limit}),
         })  # fmt: skip
     else:
-        print(f"{verdict.upper()}: {health.craft}, {kind}, {health.entries[-1].event}")
+        print(f"{verdict.upper()}: {health.craft}, {health.kind}, {health.entries[-1].event}")
         for r in reasons:
             print(wrapped("  ", r))
         print_newest(health, figures)

@@ -23,6 +23,7 @@ from ...kit.doubts import Doubts
 from ...kit.errors import check_choice
 from ...kit.timeline import NS
 from ...telemetry.channels import AXES
+from ..subject import OF_THE_SUN, sky_doubts
 from .orbits import carried, gravity_words, longest_gap, orbit_in, refuse_contradictions
 from .sky import Place, Seen, attitude_at, field_at_craft, rods_at, sun_at_craft
 from .term import Term, levers
@@ -122,6 +123,8 @@ def environment_of(
         field_at_craft(tlm, place) if {"dipole", "rods"} & set(which) else (None, "", [])
     )
     sun, no_sun, of_sun = sun_at_craft(tlm, place) if "sunlight" in which else (None, "", [])
+    if "sunlight" in which:
+        of_sun = [*of_sun, *sky_doubts(tlm, craft).of(*OF_THE_SUN)]
     makers = {
         "gravity-gradient": partial(_gravity, subject, place, why),
         "sunlight": partial(_sunlight, craft, place, sun, no_sun),
@@ -164,7 +167,7 @@ def _place(subject: Subject, tai_ns: np.ndarray) -> tuple[Place, Doubts, str]:
 
         position, velocity = flown(craft.orbit, tai_ns / NS)
         orbit, body, why = Orbit(t, position), BODIES[0].name, ""
-        doubts = doubts + [carried(craft.orbit.epoch, tai_ns)]
+        doubts = Doubts([*doubts, carried(craft.orbit.epoch, tai_ns)])
     R = attitude_at(tlm, tai_ns)
     return Place(tai_ns, tlm.dated, R, orbit, position, velocity, body), doubts, why
 
@@ -197,10 +200,13 @@ def _gravity(subject: Subject, place: Place, why: str) -> Term | str:
 
 
 def inertia_sigma(subject: Subject) -> np.ndarray:
-    """One sigma of the six elements (6,): the share stated, of each moment; of a product, that share of its two moments' mean."""
-    I = np.diag(subject.inertia_kgm2)  # type: ignore[arg-type]
+    """One sigma of the six elements (6,): the share stated, of each moment; of a product half that share of its two moments' mean.
+
+    Half: errors of the mass's second moments that favour no axes have sigma s in the diagonal and s / sqrt(2) beside it; a moment of
+    inertia is the sum of two of the first, a product one of the second."""
+    moments = np.diag(subject.inertia_kgm2)  # type: ignore[arg-type]
     i, j = np.triu_indices(3)
-    return subject.inertia_share * np.sqrt(I[i] * I[j])
+    return subject.inertia_share * np.sqrt(moments[i] * moments[j]) * np.where(i == j, 1.0, 0.5)
 
 
 def _sunlight(craft: Craft, place: Place, sun: Seen | None, missing: str) -> Term | str:

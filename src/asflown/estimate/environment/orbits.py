@@ -53,6 +53,10 @@ NOT_PLAUSIBLE = Kind(
     "gravity gradient is left out",
     "Check the unit and the origin of orbit_position.",
 )  # fmt: skip
+NO_FIX = Kind(
+    "environment.no-fix", Severity.NOTE,
+    "orbit_position is zero in {count} of its samples, as a receiver without a fix writes it: these are left out",
+)  # fmt: skip
 MISREAD = Kind(
     "environment.positions-misread", Severity.SUSPECT,
     "orbit_position is an orbit about a known body only if its values are {reading}",
@@ -83,9 +87,13 @@ def orbit_in(
     if not telemetry.has_axes("orbit_position"):
         return None, "", Doubts(), 0
     tai_ns, position = together(telemetry, _STEMS)
+    fixed = np.linalg.norm(position, axis=1) > 1.0  # a receiver without a fix writes zeros
+    lost = NO_FIX(count=int(np.sum(~fixed))) if not fixed.all() else None
+    tai_ns, position = tai_ns[fixed], position[fixed]
     if len(tai_ns) < FEWEST:
-        return None, "", Doubts(), len(tai_ns)
+        return None, "", Doubts([] if len(tai_ns) else [lost]), len(tai_ns)
     orbit, body, doubts = _about(Orbit((tai_ns - start_ns) / NS, position), left_out)
+    doubts.append(lost)
     if orbit is not None:
         doubts.append(_velocity(telemetry, start_ns, orbit))
     return orbit, body, Doubts(doubts), len(tai_ns)

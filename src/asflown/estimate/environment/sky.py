@@ -1,6 +1,6 @@
 """What surrounds a craft at any instants: field, Sun and shadow, air stream, each from the best that is known, with where it is from.
 
-A channel is preferred to a model; where both are there, the model judges the channel.
+A channel is preferred to a model; where both are there, the model has judged the channel (``subject.sky``).
 """
 
 from __future__ import annotations
@@ -25,13 +25,8 @@ if TYPE_CHECKING:
 
 #: Fewest samples of a vector that are used.
 _FEWEST = 8
-#: Beyond these a measured direction contradicts what it is held against. [rad]  A coarse sun sensor errs by a few degrees, IGRF in low
-#: orbit by less than one.
-_SUN_OFF, _FIELD_OFF = np.radians(15), np.radians(20)
-#: The field's size is right within this factor: a wrong unit is not.
-_FIELD_SIZE = 1.5
-#: Shadow by the sun sensor and by geometry may differ for so long at an edge. [s]
-_EDGE_S = 60.0
+#: A coarse sun sensor errs by a few degrees. [rad]
+_SUN_OFF = np.radians(15)
 #: Longest stretch over which the Sun stands still: it moves by 1 degree a day. [s]
 _SUN_STANDS_S = 6 * 3600.0
 
@@ -39,23 +34,6 @@ SUN_TURNS = Kind(
     "environment.sun-turns", Severity.SUSPECT,
     "the measured Sun does not stay where it is in inertial axes: it wanders by {off_deg:.0f} degrees (rms)",
     "Check the body axes of the sun sensor against those of the quaternion.",
-)  # fmt: skip
-SUN_APART = Kind(
-    "environment.sun-apart", Severity.SUSPECT,
-    "the measured Sun stands {off_deg:.0f} degrees from where it is on that date: the measured one is used",
-    "Check the epoch, and the axes of sun_direction and of the quaternion.",
-)  # fmt: skip
-SHADOW_APART = Kind(
-    "environment.shadow-apart", Severity.SUSPECT,
-    "the sun sensor's shadow is not the Earth's: {dark_s:.0f} s dark where orbit and Sun give light, {light_s:.0f} s light where they give "
-    "shadow. The sensor is believed",
-    "Check orbit_position and the epoch; a sun vector of zero must mean shadow, not a Sun outside the sensor's view.",
-)  # fmt: skip
-FIELD_APART = Kind(
-    "environment.field-apart", Severity.SUSPECT,
-    "the measured magnetic field is {ratio:.3g} times as strong as IGRF's at the orbit's position and {off_deg:.0f} degrees from it (medians): "
-    "the measured one is used",
-    "Check the unit of magnetic_field (nT labelled T?), its axes, the epoch and the quaternion.",
 )  # fmt: skip
 
 
@@ -108,16 +86,15 @@ def attitude_at(telemetry: Telemetry, tai_ns: np.ndarray) -> np.ndarray | None:
 
 def field_at_craft(telemetry: Telemetry, place: Place) -> tuple[Seen | None, str, list[Doubt]]:
     """Magnetic field in body axes [T]; or None and why; doubts."""
-    model = _igrf(place)
     found = _channel(telemetry, "magnetic_field")
     if found is None:
+        model = _igrf(place)
         if isinstance(model, str):
             return None, f"magnetic_field_x, _y, _z ({model})", []
         return Seen(model, "field from IGRF-14 at the orbit's position (ppigrf)", np.ones(len(model))), "", []
     t, B = found
     u = _between(t, B, place.tai_ns)
-    doubts = [] if isinstance(model, str) else _field_doubts(u, model)
-    return Seen(u, "field from the magnetometer", np.ones(len(u))), "", doubts
+    return Seen(u, "field from the magnetometer", np.ones(len(u))), "", []
 
 
 def _igrf(place: Place) -> np.ndarray | str:
@@ -132,20 +109,11 @@ def _igrf(place: Place) -> np.ndarray | str:
         return str(why.what)
 
 
-def _field_doubts(u: np.ndarray, model: np.ndarray) -> list[Doubt]:
-    size, expected = np.linalg.norm(u, axis=1), np.linalg.norm(model, axis=1)
-    ratio = float(np.median(size / expected))
-    off = float(np.median(_angle(u, model)))
-    if 1 / _FIELD_SIZE < ratio < _FIELD_SIZE and off < _FIELD_OFF:
-        return []
-    return [FIELD_APART(ratio=ratio, off_deg=float(np.degrees(off)))]
-
-
 def sun_at_craft(telemetry: Telemetry, place: Place) -> tuple[Seen | None, str, list[Doubt]]:
     """Direction to the Sun in body axes and the share of it that is lit; or None and why; doubts."""
     found = _channel(telemetry, "sun_direction")
-    model = _modelled_sun(place)
     if found is None:
+        model = _modelled_sun(place)
         if isinstance(model, str):
             return None, f"sun_direction_x, _y, _z ({model})", []
         from ...dynamics.sun import sunlit
@@ -164,7 +132,6 @@ def sun_at_craft(telemetry: Telemetry, place: Place) -> tuple[Seen | None, str, 
     else:
         sun_N, doubts = _steady_sun(telemetry, t_on, s_on, place)
         u = place.to_body(sun_N)
-        doubts += _sun_doubts(sun_N, model, lit, place)
     return Seen(u, "Sun and shadow from the sun sensor", lit), "", doubts
 
 
@@ -185,27 +152,11 @@ def _steady_sun(telemetry: Telemetry, t: np.ndarray, s_B: np.ndarray, place: Pla
     parts = np.array_split(np.arange(len(t)), count)
     means = _unit(np.array([s_N[p].mean(axis=0) for p in parts]))
     middles = np.array([t[p].mean() for p in parts])
-    off = float(np.sqrt(np.mean(np.concatenate([_angle(s_N[p], m[None]) ** 2 for p, m in zip(parts, means, strict=True)]))))
+    off = float(
+        np.sqrt(np.mean(np.concatenate([_angle(s_N[p], m[None]) ** 2 for p, m in zip(parts, means, strict=True)])))
+    )
     doubts: list[Doubt] = [SUN_TURNS(off_deg=float(np.degrees(off)))] if off > _SUN_OFF else []
     return _unit(_between(middles, means, place.tai_ns)), doubts
-
-
-def _sun_doubts(sun_N: np.ndarray, model: np.ndarray | str, lit: np.ndarray, place: Place) -> list[Doubt]:
-    """The sensor against the date, and its shadow against the orbit's (with the Sun where the sensor has it)."""
-    doubts: list[Doubt] = []
-    if not isinstance(model, str):
-        off = float(np.median(_angle(sun_N, model)))
-        if off > _SUN_OFF:
-            doubts.append(SUN_APART(off_deg=float(np.degrees(off))))
-    if place.at_earth:
-        from ...dynamics.sun import sunlit
-
-        geometric = sunlit(place.position_N, sun_N) > 0.5
-        step = np.gradient(_s(place.tai_ns, place.tai_ns[0])) if len(lit) > 1 else np.ones(1)
-        dark, light = (float(np.sum(step[m])) for m in (geometric & (lit < 0.5), ~geometric & (lit > 0.5)))
-        if max(dark, light) > _EDGE_S:
-            doubts.append(SHADOW_APART(dark_s=dark, light_s=light))
-    return doubts
 
 
 def _channel(telemetry: Telemetry, stem: str) -> tuple[np.ndarray, np.ndarray] | None:

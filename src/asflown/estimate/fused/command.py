@@ -1,9 +1,9 @@
 """The motion that the controller follows, and the torque it adds to follow it.
 
 Of a body at rate w = w_c + d, w_c commanded, I d' = T - w x H - I w_c' + u.  The controller's u is that of a hold on the
-deviation d, plus an f that is known from w_c and H: what it feeds forward, and, where it does not track the commanded rate,
-what that makes of its damping.  With h + integral of f in place of the wheels' momentum h, and w x H + I w_c' - f taken off as
-a known torque, the model of a hold serves for any motion.
+deviation d, plus a feed-forward f that is known from w_c and H: with h + integral of f in place of the wheels' momentum h,
+and w x H + I w_c' - f taken off as a known torque, the model of a hold serves for any motion.  A controller that does not track
+the commanded rate holds an attitude that lags behind by F(w_c) / KP: deviations are then from that attitude.
 """
 
 from __future__ import annotations
@@ -49,8 +49,9 @@ FED_OTHERWISE = Kind(
 class Command:
     """On the grid: rates, their derivative and the feed-forward on the body, (M, 3); variance of the rates and of their derivatives (2, 3).
 
-    ``source``: where the rates are from; ``gyroscopic``, ``acceleration``: what the controller feeds forward; ``doubts``: where
-    the actuators say otherwise than the craft file."""
+    ``beside_Nm``: (3,), one sigma of what the actuators slowly do beside the law, which is in the feed-forward; ``source``: where
+    the rates are from; ``gyroscopic``, ``acceleration``: what the controller feeds forward; ``doubts``: where the actuators say
+    otherwise than the craft file."""
 
     seconds: np.ndarray
     rate: np.ndarray
@@ -58,6 +59,8 @@ class Command:
     feed_Nm: np.ndarray
     fed_Nms: np.ndarray  # its integral
     variance: np.ndarray
+    beside_Nm: np.ndarray
+    lag_rad: np.ndarray  # (M, 3), by which the attitude that the loop holds is behind the one commanded
     source: str
     gyroscopic: bool
     acceleration_fed: bool
@@ -74,6 +77,8 @@ class Command:
         if s.row == BODY_RATE:
             off = s.values - self.on(s.seconds, self.rate, j)
             return replace(s, values=off - np.median(off))  # the sensor's bias
+        if s.row == ATTITUDE_ERROR:
+            return _less_lag(s, self.seconds, self.lag_rad[:, j])
         if s.row == MOMENTUM:
             return replace(s, values=s.values + self.on(s.seconds, self.fed_Nms, j))
         return s
@@ -109,26 +114,35 @@ def command_of(
     rate, acceleration, variance, source = _commanded(subject, grid, series, law)
     at = grid.seconds
     h = np.column_stack([np.interp(at, stored[0], stored[1][:, j]) for j in range(3)])
-    J = law.believed_kgm2(I_B)
+    J, lag = law.believed_kgm2(I_B), _lag(law, rate, grid.step_s)
+    series = {j: [_less_lag(s, at, lag[:, j]) for s in of_axis] for j, of_axis in series.items()}
+    slower = np.gradient(lag, at, axis=0)
+    rate, acceleration = rate - slower, acceleration - np.gradient(slower, at, axis=0)
     turn, push = np.cross(rate, rate @ J + h), acceleration @ J
     without, fed_forward = _left_over(law, J, series, turn)
     gyroscopic = fed_forward < without if law.gyroscopic is None else law.gyroscopic
     stated, other = (fed_forward, without) if gyroscopic else (without, fed_forward)
     doubts = Doubts([FED_OTHERWISE(said="does" if gyroscopic else "does not")] if stated > _PLAIN * other else ())
     pushed = gyroscopic if law.acceleration is None else law.acceleration
-    damped = np.zeros_like(rate) if law.tracking else _damped(law, rate, grid.step_s) * np.diag(J)
-    feed = gyroscopic * turn + pushed * push + damped
-    fed = cumulative_trapezoid(gyroscopic * turn + damped, at, axis=0, initial=0) + pushed * (rate - rate[0]) @ J
+    feed = gyroscopic * turn + pushed * push
+    fed = gyroscopic * cumulative_trapezoid(turn, at, axis=0, initial=0) + pushed * (rate - rate[0]) @ J
+    beside = np.zeros(3)
     for j, of_axis in series.items():
         more = _beside(of_axis, fed[:, j], at, J[j, j] * law.kd_per_s, law)
         feed[:, j], fed[:, j] = feed[:, j] + more.at(at, 1), fed[:, j] + more.at(at, 0)
-        variance[1, j] += more.variance[0] / I_B[j, j] ** 2
-    return Command(at, rate, acceleration, feed, fed, variance, source, gyroscopic, pushed, doubts)
+        beside[j] = np.sqrt(more.variance[0])
+    return Command(at, rate, acceleration, feed, fed, variance, beside, lag, source, gyroscopic, pushed, doubts)
 
 
-def _damped(law: WheelController, rate: np.ndarray, step_s: float) -> np.ndarray:
-    """What a law that does not track does against the commanded rates (M, 3), per unit inertia."""
-    return -law.kd_per_s * np.column_stack([filtered_rate(law, rate[:, j], step_s) for j in range(3)])
+def _lag(law: WheelController, rate: np.ndarray, step_s: float) -> np.ndarray:
+    """By what a law that does not track lags behind the attitude commanded, (M, 3) [rad]."""
+    if law.tracking:
+        return np.zeros_like(rate)
+    return np.column_stack([filtered_rate(law, rate[:, j], step_s) for j in range(3)]) / law.kp_per_s
+
+
+def _less_lag(s: Series, seconds: np.ndarray, lag: np.ndarray) -> Series:
+    return replace(s, values=s.values - np.interp(s.seconds, seconds, lag)) if s.row == ATTITUDE_ERROR else s
 
 
 def _commanded(subject: Subject, grid: Grid, series, law: WheelController):

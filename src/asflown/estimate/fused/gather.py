@@ -111,7 +111,11 @@ def gather(
     if loop == "measured":  # where wheels stick and tear loose, the jitter of sampling instants matters
         series = {j: [s.with_jumps() for s in of_axis] for j, of_axis in series.items()}
     command: Command | None = None
-    if loop == "modelled" and len(series) == 3 and (follow or has_command(subject)):
+    if (
+        loop == "modelled"
+        and len(series) == 3
+        and (follow or has_command(subject) or not subject.controller().tracking)
+    ):
         command = command_of(subject, grid, series, (momentum.seconds, momentum.values_Nms))
         series = command.taken_off(series)
     silent = {g: c.name for c in everything for g in gaps_on_grid(c, grid)}

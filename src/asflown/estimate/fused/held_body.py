@@ -60,7 +60,8 @@ class HeldBody(Body):
     STATES: ClassVar[int] = _STATES
     RATE: ClassVar[int] = _RATE
     STORED: ClassVar[int] = _STORED
-    SPREAD: ClassVar[tuple[float, ...]] = (1.5, 0.8, 0.7, 0.7, 0.7, 1.0, 0.7, 1.5)
+    # lengths of a torque: from a thruster's seconds to an orbit
+    SPREAD: ClassVar[tuple[float, ...]] = (1.5, 1.2, 0.7, 0.7, 0.7, 1.0, 0.7, 1.5)
 
     @classmethod
     def under(
@@ -136,14 +137,15 @@ class HeldBody(Body):
         by_row = {s.row: s for s in series}
         h = by_row[MOMENTUM]
         push = max(usual_size(np.gradient(h.values, h.seconds)), 1e-7)
-        white = white_noise(by_row[ATTITUDE_ERROR], 1e-9)
+        white, stored = white_noise(by_row[ATTITUDE_ERROR], 1e-9), white_noise(h, 1e-6)
         return LoopLevels(
             torque_Nm=push,
             length_s=15.0,
             rate_white_rad_s=white_noise(by_row[BODY_RATE], 1e-10),
-            momentum_white_Nms=white_noise(h, 1e-6),
+            momentum_white_Nms=stored,
             error_white_rad=white,
             error_slow_rad=1.5 * white,
             error_time_s=15.0,
-            reaction_Nm_sqrt_s=max(0.05 * push, 1e-6),
+            # a third of what would make all of that noise: of a small craft w_u makes most of it, of a large one the reading
+            reaction_Nm_sqrt_s=0.3 * stored / np.sqrt(np.median(np.diff(h.seconds))),
         )

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .swing import posterior
+from .swing import looked_for, posterior
 
 if TYPE_CHECKING:
     from .whitened import Whitened
 
+#: Cells of the swing's grid: the best is wanted, not its surroundings.
+_CELLS = 12
 #: Stretches that are held back in turn.
 _FOLDS = 8
 
@@ -33,10 +35,10 @@ def compare(white: Whitened, sources: tuple[str, ...]) -> tuple[Model, ...]:
     n = int(white.kept.sum())
     bic, foretold = [], []
     for subset in subsets:
-        best = posterior(white, subset)
+        best = posterior(white, subset, _CELLS)
         free = sum(names.count(s) for s in subset) + 2 * ("drag" in subset)
         bic.append(-2 * best.log_best + free * np.log(n))
-        foretold.append(_foretold(white, subset, best.swing[int(np.argmax(best.weight))], best.kept))
+        foretold.append(_foretold(white, subset, best.swing[int(np.argmax(best.weight))], best.kept | ~looked_for(white.arc)))
     order = np.argsort(bic)
     return tuple(
         Model(subsets[k], float(bic[k] - min(bic)), float(max(foretold) - foretold[k])) for k in order

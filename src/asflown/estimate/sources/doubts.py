@@ -48,6 +48,12 @@ STEPS = Kind(
     "{count} blocks miss the fit by more than 6 sigma, the first {first_s:.0f} s from the start, and are left out: a thruster, a docking, a mechanism?",
     "Narrow the span (--start, --stop), or exclude it (--exclude).",
 )  # fmt: skip
+NO_CONSTANT = Kind(
+    "sources.no-constant", Severity.NOTE,
+    "a constant torque is left out: the record is explained without it (BIC lower by {bic:.0f}). With one, {what} would be known {factor:.0f} "
+    "times worse",
+    "Give --sources with constant to have it in.",
+)  # fmt: skip
 SIMPLER = Kind(
     "sources.simpler", Severity.NOTE,
     "the record asks for {better} only: the BIC of that is lower by {bic:.0f}", "Try --sources with these.",
@@ -95,7 +101,7 @@ def _noise(white: Whitened, residual: Residual) -> list[Doubt]:
 
 def _choice(models: tuple[Model, ...], fitted: tuple[str, ...]) -> list[Doubt]:
     whole = next(m for m in models if set(m.sources) == set(fitted))
-    if whole.bic_above_best < _BETTER:
+    if whole.bic_above_best < _BETTER or models[0].sources == fitted:
         return []
     return [SIMPLER(better=list(models[0].sources) or "no source", bic=whole.bic_above_best)]
 

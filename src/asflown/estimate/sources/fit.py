@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...kit.doubts import Doubts
+from ...kit.doubts import Doubt, Doubts
 from ...kit.errors import BadInput, check_choice
 from ...kit.result import recorded
 from ..subject import PER_SPIN_INERTIA, subject_of
-from .compare import compare
-from .doubts import fit_doubts
-from .gather import Arc, gather
+from .compare import Model, compare
+from .doubts import NO_CONSTANT, fit_doubts
+from .gather import DENSITY, Arc, gather, with_harmonics
 from .residual import residual_of
 from .result import Fitted, SourcesResult
 from .swing import Posterior, posterior
-from .untold import Told, untold_in
+from .untold import Told, untold_in, words
 from .whitened import Whitened, whitened
 
 if TYPE_CHECKING:
@@ -24,9 +24,12 @@ if TYPE_CHECKING:
 
     from ...craft.model import Craft
     from ...telemetry.telemetry import Telemetry
+    from ..subject import Subject
     from ..environment import Air
 
 SOURCES = ("dipole", "sunlight", "drag", "constant")
+#: A constant torque is left out where the BIC is lower by this without it.
+CONSTANT_COSTS = 6.0
 #: A component is told where the data leave less than this share of what was open before.
 _TOLD = 0.7
 
@@ -50,7 +53,8 @@ def sources(
     craft : Craft
         Inertia, wheels; ``orbit`` where the telemetry has no positions.
     which : sequence of str, optional
-        Sources looked for, of 'dipole', 'sunlight', 'drag', 'constant'; by default all whose vectors are known.
+        Sources looked for, of 'dipole', 'sunlight', 'drag', 'constant'; by default all whose vectors are known, the constant torque
+        only where the record asks for it (BIC).
     without : sequence of str
         Sources left out.
     air : Air, optional
@@ -84,37 +88,70 @@ def sources(
             remedy="Add these channels.",
         )
     white = whitened(arc)
+    if "drag" in fitted:
+        first = posterior(white, tuple(n for n in fitted if n != "constant")).whole(white)
+        drag = arc.of("drag")
+        white = whitened(with_harmonics(arc, arc.torque[:, :, drag] @ first[drag], modelled=air is not None))
+    models = compare(white, fitted)
+    chosen: list[Doubt] = []
+    if which is None and "constant" in fitted:
+        fitted, chosen = _needed(white, models, fitted)
+    return _result(subject, white, fitted, models, asked, chosen)
+
+
+def _result(
+    subject: Subject, white: Whitened, fitted: tuple[str, ...], models: tuple[Model, ...], asked: tuple[str, ...],
+    chosen: list[Doubt],
+) -> SourcesResult:  # fmt: skip
+    arc, around = white.arc, white.arc.environment
     found = posterior(white, fitted)
     told = _told(arc, found)
-    untold = untold_in(arc, found, told, fitted)
-    theta = found.whole(len(arc.columns), arc.of("drag"), arc.of("drag cos"), arc.of("drag sin"))
+    theta = found.whole(white)
     residual = residual_of(white, theta)
-    models = compare(white, fitted)
+    doubts = [
+        *subject.doubts, *arc.doubts, *chosen, *fit_doubts(white, arc, theta, residual, models, fitted),
+        PER_SPIN_INERTIA(what="the torque is") if subject.relative else None,
+    ]  # fmt: skip
     return SourcesResult(
         craft=subject.craft.craft.name,
-        epoch=telemetry.epoch_label,
+        epoch=subject.telemetry.epoch_label,
         method="momentum",
         found={n: _fitted(arc, found, told, n) for n in fitted},
         inertia=_fitted(arc, found, told, "inertia") if arc.of("inertia").any() else None,
         swing=_swing(found) if "drag" in fitted else None,
         correlations=_correlations(arc, found),
-        time_s=telemetry.seconds(arc.tai_ns),
+        time_s=subject.telemetry.seconds(arc.tai_ns),
         contributions=_contributions(arc, theta, fitted),
-        lit=None if arc.environment.lit is None else np.interp(arc.tai_ns, arc.environment.tai_ns, arc.environment.lit),
-        phase_rad=None if arc.environment.phase_rad is None else np.interp(arc.tai_ns, arc.environment.tai_ns, arc.environment.phase_rad),
+        lit=None if around.lit is None else np.interp(arc.tai_ns, around.tai_ns, around.lit),
+        phase_rad=arc.phase,
         residual=residual,
         size_Nm=arc.size_Nm,
-        untold=untold,
+        untold=untold_in(arc, found, told, fitted),
         models=models,
         relative=subject.relative,
-        where_from={t.name: t.source for t in arc.environment.terms},
-        left_out={n: w for n, w in arc.environment.left_out.items() if n in asked or n == "gravity-gradient"},
+        where_from={t.name: t.source for t in around.terms},
+        left_out={n: w for n, w in around.left_out.items() if n in asked or n == "gravity-gradient"},
         settings=_settings(white),
-        doubts=Doubts([
-            *subject.doubts, *arc.doubts, *fit_doubts(white, arc, theta, residual, models, fitted),
-            PER_SPIN_INERTIA(what="the torque is") if subject.relative else None,
-        ]),
-    )  # fmt: skip
+        doubts=Doubts(doubts),
+    )
+
+
+def _needed(
+    white: Whitened, models: tuple[Model, ...], fitted: tuple[str, ...]
+) -> tuple[tuple[str, ...], list[Doubt]]:
+    """The sources without the constant torque where the record is better explained without it, and what that hides."""
+    without = tuple(n for n in fitted if n != "constant")
+    bic = {frozenset(m.sources): m.bic_above_best for m in models}
+    more = bic[frozenset(fitted)] - bic[frozenset(without)]
+    if more < CONSTANT_COSTS or not without:
+        return fitted, []
+    names = white.arc.columns
+    kept = [(c, k) for k, c in enumerate(np.flatnonzero(posterior(white, without).kept)) if names[c].source in without]
+    one, other = posterior(white, without), posterior(white, fitted)
+    place = {int(c): k for k, c in enumerate(np.flatnonzero(other.kept))}
+    wider = [(np.sqrt(other.spread[place[c], place[c]] / one.spread[k, k]), names[c]) for c, k in kept]
+    factor, column = max(wider, key=lambda w: w[0])
+    return without, [NO_CONSTANT(bic=more, factor=float(factor), what=words(column))]
 
 
 def _told(arc: Arc, found: Posterior) -> dict[int, Told]:
@@ -165,7 +202,9 @@ def _contributions(arc: Arc, theta: np.ndarray, fitted: tuple[str, ...]) -> dict
     """Torque of every source at the blocks' middles, (K, 3) each; the known ones too."""
     made = {n: v.copy() for n, v in arc.known.items()}
     for name in fitted:
-        use = arc.of(name) | (arc.of(f"{name} cos") | arc.of(f"{name} sin"))
+        use = arc.of(name) | arc.of(f"{name} cos") | arc.of(f"{name} sin")
+        if name == "drag":
+            use |= np.array([c.name.startswith(DENSITY) for c in arc.columns])
         made[name] = arc.torque[:, :, use] @ theta[use]
     for name, columns in (("gravity-gradient", arc.of("inertia")), ("rods", np.array([c.name == "rods" for c in arc.columns]))):
         if name in made:

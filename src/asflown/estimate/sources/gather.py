@@ -7,7 +7,7 @@ The total momentum H of body and wheels changes in inertial axes only by the tor
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,12 +31,17 @@ if TYPE_CHECKING:
 
 #: Blocks of a record, and the shortest. [s]
 _BLOCKS, _SHORTEST_S = 600, 2.0
+#: What columns of the density's higher harmonics are called.
+DENSITY = "density"
 #: A stretch without samples after which the momentum starts anew. [s]
 _GAP_S = 60.0
 #: One sigma of a gyro's bias where no quaternion tells it: a good small gyro's. Assumed. [rad/s]
 _BIAS = 5e-6
 #: A source alone may exert so many times the torque that is seen (rms), one sigma: sources seldom cancel to less than a third.
 ALONE = 3.0
+#: One sigma of the density's second and third harmonic over the orbit, as shares of its mean: the day's bulge is no sine. Without a model
+#: of the air, and with one.
+_HARMONICS, _HARMONICS_MODELLED = (0.1, 0.05), (0.03, 0.02)
 #: The penumbra's middle is known to this. [s]  It lasts 8 s in low orbit and longer where the craft grazes the shadow.
 _EDGE_S = 4.0
 
@@ -87,6 +92,12 @@ class Arc:
     environment: Environment
     doubts: Doubts
 
+    @property
+    def phase(self) -> np.ndarray | None:
+        """Way round the orbit at the blocks' middles. (K,)"""
+        whole = self.environment.phase_rad
+        return None if whole is None else np.interp(self.tai_ns, self.environment.tai_ns, whole)
+
     def of(self, source: str) -> np.ndarray:
         """Which columns belong to a source."""
         return np.array([c.source == source for c in self.columns])
@@ -94,13 +105,16 @@ class Arc:
 
 @dataclass(frozen=True)
 class _Course:
-    """Instants, attitude, momentum in body axes of body and of each wheel, rates; doubts."""
+    """Instants, attitude, momentum in body axes of body and of each wheel; doubts.
+
+    ``turn`` (N, 3): the body's rate by the quaternion, whose noise is not that of the gyros in ``momentum``: of gyro rates, an inertia
+    fitted would cancel their own noise."""
 
     tai_ns: np.ndarray
     R: np.ndarray
     momentum: np.ndarray
     each: np.ndarray  # (N, n, 3)
-    rates: np.ndarray
+    turn: np.ndarray
     bias_sigma: float
     doubts: Doubts
 
@@ -137,6 +151,19 @@ def gather(subject: Subject, which: Sequence[str], air: Air | None) -> Arc:
         known={n: mean(v) for n, v in known.items()}, size_Nm=size, step_s=float(np.median(np.diff(middle))), environment=around,
         doubts=Doubts([*course.doubts, *around.doubts]),
     )  # fmt: skip
+
+
+def with_harmonics(arc: Arc, lever_torque: np.ndarray, modelled: bool) -> Arc:
+    """The arc with higher harmonics of the density among its unknowns, each a torque as drag's (K, 3) that swings faster."""
+    phase = arc.phase
+    assert phase is not None
+    sizes = _HARMONICS_MODELLED if modelled else _HARMONICS
+    shares = [s * f(k * phase) for k, s in zip((2, 3), sizes, strict=True) for f in (np.cos, np.sin)]
+    torque = lever_torque[:, :, None] * np.stack(shares, axis=1)[:, None, :]
+    grown = cumulative_trapezoid(arc.turn @ torque, arc.time_s, axis=0, initial=0)
+    columns = tuple(Column("", f"{DENSITY} {k}", "", 1.0) for k in range(torque.shape[2]))
+    Z = np.concatenate([arc.Z, np.swapaxes(arc.turn, 1, 2) @ grown], axis=2)
+    return replace(arc, Z=Z, columns=(*arc.columns, *columns), torque=np.concatenate([arc.torque, torque], axis=2))
 
 
 class _Means:
@@ -176,33 +203,33 @@ def _course(subject: Subject) -> _Course:
         doubts += s.doubts
     t = (tai_ns - tai_ns[0]) / NS
     R = attitude_at(tlm, tai_ns)
-    bias, bias_sigma = np.zeros(3), _BIAS
+    turn, bias, bias_sigma = rates, np.zeros(3), _BIAS
     if R is None:
         R = turned_by(t, rates).as_matrix()
         doubts.append(ATTITUDE_FROM_RATES())
     else:
-        bias, bias_sigma = _bias(subject, tai_ns, rates)
+        turn, bias, bias_sigma = _turn(subject, tai_ns, rates)
     momentum = (rates - bias) @ I_B + each.sum(axis=1)
     if pushed is not None:  # dh/dt = -u in inertial axes
         given = cumulative_trapezoid(np.einsum("nij,nj->ni", R, pushed), t, axis=0, initial=0)
         momentum = momentum - np.einsum("nji,nj->ni", R, given)
-    return _Course(tai_ns, R, momentum, each, rates - bias, bias_sigma, Doubts(doubts))
+    return _Course(tai_ns, R, momentum, each, turn, bias_sigma, Doubts(doubts))
 
 
-def _bias(subject: Subject, tai_ns: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, float]:
-    """The gyros' bias against the quaternion's turn, (3,), and one sigma. [rad/s]"""
-    names = [f"quaternion_{m}" for m in "wxyz"]
-    at, q = together(subject.telemetry, names)
+def _turn(subject: Subject, tai_ns: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Rates of the quaternion (N, 3), the gyros' bias against them (3,), and one sigma of it. [rad/s]"""
+    at, q = together(subject.telemetry, [f"quaternion_{m}" for m in "wxyz"])
     mid, w = rates_between((at - tai_ns[0]) / NS, q)
     t = (tai_ns - tai_ns[0]) / NS
+    turn = np.stack([np.interp(t, mid, w[:, j]) for j in range(3)], axis=1)
     off = np.stack([np.interp(mid, t, rates[:, j]) for j in range(3)], axis=1) - w
     inside = (mid >= t[0]) & (mid <= t[-1])
     if inside.sum() < FEWEST:
-        return np.zeros(3), _BIAS
+        return rates, np.zeros(3), _BIAS
     off = off[inside]
     scatter = robust_sigma(off - np.median(off, axis=0), axis=0)
     # differenced angles' noise cancels along a record; that of the gyros does not
-    return off.mean(axis=0), float(2 * scatter.max() / np.sqrt(len(off)))
+    return turn, off.mean(axis=0), float(2 * scatter.max() / np.sqrt(len(off)))
 
 
 def _grown(course: _Course, torque: np.ndarray) -> np.ndarray:
@@ -251,7 +278,7 @@ def _columns(subject: Subject, course: _Course, around: Environment, which: Sequ
     gravity = around.term("gravity-gradient")
     G = None if gravity is None else gravity.design
     add("inertia", list(gravity.labels) if gravity else [], "kg m2", inertia_sigma(subject) if gravity else [], G,
-        -momentum_regressor(course.rates) if gravity else None)  # fmt: skip
+        -momentum_regressor(course.turn) if gravity else None)  # fmt: skip
     if around.term("rods") is not None:
         add("", ["rods"], "", 0.05, around.term("rods").design)
     if course.each.shape[1]:

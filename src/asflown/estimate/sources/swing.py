@@ -16,6 +16,7 @@ from scipy import optimize
 from scipy.special import ndtr
 
 if TYPE_CHECKING:
+    from .gather import Arc
     from .whitened import Whitened
 
 #: The largest swing: a density is never negative.
@@ -60,55 +61,77 @@ class Posterior:
 
         return quantile(tail), quantile(1 - tail)
 
-    def whole(self, columns: int, drag: np.ndarray, cos: np.ndarray, sin: np.ndarray) -> np.ndarray:
-        """Mean of every column of the arc (columns,), those of the swing among them; masks of drag's columns."""
-        full = np.zeros((len(self.weight), columns))
+    def whole(self, white: Whitened) -> np.ndarray:
+        """Mean of every column of the arc, (columns,): those of the swing and those that are not looked for among them."""
+        arc = white.arc
+        full = np.zeros((len(self.weight), len(arc.columns)))
         full[:, self.kept] = self.mean
-        if drag.any():
-            full[:, cos] = self.swing[:, :1] * full[:, drag]
-            full[:, sin] = self.swing[:, 1:] * full[:, drag]
-        return self.weight @ full
+        if self.kept[arc.of("drag")].any():
+            for part, share in zip(("drag cos", "drag sin"), self.swing.T, strict=True):
+                full[:, arc.of(part)] = share[:, None] * full[:, arc.of("drag")]
+        mean = self.weight @ full
+        rest = ~looked_for(arc)
+        N = white.information[1:, 1:]
+        mean[rest] = np.linalg.solve(
+            N[np.ix_(rest, rest)] + np.eye(int(rest.sum())), white.information[1:, 0][rest] - N[np.ix_(rest, ~rest)] @ mean[~rest]
+        )
+        return mean
 
 
-def posterior(white: Whitened, sources: tuple[str, ...], rows: np.ndarray | None = None) -> Posterior:
-    """With the unknowns of ``sources`` and those of no source; ``rows``: which readings count."""
-    arc = white.arc
-    E = white.E if rows is None else white.E[rows]
-    info = E.T @ E
-    names = np.array([c.source for c in arc.columns])
-    kept = np.isin(names, ["", "inertia", *sources])
+def looked_for(arc: Arc) -> np.ndarray:
+    """Which columns belong to a source or to the inertia; the others have a prior and are solved for on the way."""
+    return np.array([bool(c.source) for c in arc.columns])
+
+
+def _reduced(white: Whitened) -> tuple[np.ndarray, np.ndarray]:
+    """Information of the readings and of the columns looked for once all others are solved for, and the places of those columns."""
+    of = looked_for(white.arc)
+    rest, held = np.flatnonzero(~of) + 1, np.r_[0, np.flatnonzero(of) + 1]
+    info = white.information
+    across = info[np.ix_(rest, held)]
+    inner = np.linalg.solve(info[np.ix_(rest, rest)] + np.eye(len(rest)), across)
+    return info[np.ix_(held, held)] - across.T @ inner, np.flatnonzero(of)
+
+
+def posterior(white: Whitened, sources: tuple[str, ...], cells: int = _GRID) -> Posterior:
+    """With the unknowns of ``sources``, those of the inertia, and those of no source.
+
+    ``cells``: of the grid in amplitude and in phase; it is refined until a third of them count either way."""
+    info, places = _reduced(white)
+    columns = white.arc.columns
+    names = np.array([columns[c].source for c in places])
+    use = np.isin(names, ["inertia", *sources])
+    kept = np.zeros(len(columns), bool)
+    kept[places[use]] = True
     if not ("drag" in sources and (names == "drag").any()):
-        x, C, log = _solved(info, kept, *_no_swing(names), np.zeros((1, 2)))
-        return Posterior(kept, np.ones(1), x, C, np.zeros((1, 2)), float(log[0][0]) - white.log_size)
-    masks = names == "drag", names == "drag cos", names == "drag sin"
+        x, N, best, _ = _solved(info, use, names, np.zeros((1, 2)))
+        return Posterior(kept, np.ones(1), x, np.linalg.inv(N), np.zeros((1, 2)), float(best[0]) - white.log_size)
     (a0, a1), (f0, f1) = (0.0, _MOST), (0.0, 2 * np.pi)
-    for round_ in range(6):
-        A, step = _even(a0, a1)
-        F, turn = _even(f0, f1)
+    for _ in range(6):
+        (A, step), (F, turn) = _even(a0, a1, cells), _even(f0, f1, cells)
         amplitude, phase = (v.ravel() for v in np.meshgrid(A, F, indexing="ij"))
         swing = np.column_stack([amplitude * np.cos(phase), amplitude * np.sin(phase)])
-        x, C, (best, evidence) = _solved(info, kept, *masks, swing)
+        x, N, best, evidence = _solved(info, use, names, swing)
         counted = evidence > evidence.max() - _FAINT
-        a0, a1 = max(amplitude[counted].min() - step, 0.0), min(amplitude[counted].max() + step, _MOST)
-        new = phase[counted].min() - turn, phase[counted].max() + turn
-        wide = len(np.unique(amplitude[counted])) > _GRID / 3 and len(np.unique(phase[counted])) > _GRID / 3
-        if wide or round_ == 5:
+        if min(len(np.unique(amplitude[counted])), len(np.unique(phase[counted]))) > cells / 3:
             break
-        f0, f1 = _narrowed(phase[counted], turn, (f0, f1), new)
+        a0, a1 = max(amplitude[counted].min() - step, 0.0), min(amplitude[counted].max() + step, _MOST)
+        f0, f1 = _narrowed(phase[counted], turn, (f0, f1))
     w = np.exp(evidence[counted] - evidence.max())
-    return Posterior(kept, w / w.sum(), x[counted], C[counted], swing[counted], float(best.max()) - white.log_size)
+    covariance = np.linalg.inv(N[counted])
+    return Posterior(kept, w / w.sum(), x[counted], covariance, swing[counted], float(best.max()) - white.log_size)
 
 
-def _even(low: float, high: float) -> tuple[np.ndarray, float]:
-    """Middles of even cells."""
-    step = (high - low) / _GRID
-    return low + step * (np.arange(_GRID) + 0.5), step
+def _even(low: float, high: float, cells: int) -> tuple[np.ndarray, float]:
+    """Middles of even cells, and their width."""
+    step = (high - low) / cells
+    return low + step * (np.arange(cells) + 0.5), step
 
 
-def _narrowed(phase: np.ndarray, turn: float, was: tuple[float, float], new: tuple[float, float]) -> tuple[float, float]:
-    """The span of phases that count, on a circle: the complement of the widest stretch without any."""
+def _narrowed(phase: np.ndarray, turn: float, was: tuple[float, float]) -> tuple[float, float]:
+    """The span of phases that count; on a whole circle the complement of the widest stretch without any."""
     if was[1] - was[0] < 2 * np.pi - 1e-9:
-        return new
+        return phase.min() - turn, phase.max() + turn
     at = np.unique(phase)
     gaps = np.diff(np.r_[at, at[0] + 2 * np.pi])
     widest = int(np.argmax(gaps))
@@ -119,24 +142,19 @@ def _narrowed(phase: np.ndarray, turn: float, was: tuple[float, float], new: tup
     return start - turn, stop + turn
 
 
-def _no_swing(names: np.ndarray):
-    nothing = np.zeros(len(names), bool)
-    return nothing, nothing, nothing
-
-
-def _solved(info: np.ndarray, kept: np.ndarray, drag, cos, sin, swing: np.ndarray):
-    """Of every (a, b) (C, 2): means (C, p), covariances, and log of the best and of the integral over the unknowns."""
-    p, columns = int(kept.sum()), len(kept)
+def _solved(info: np.ndarray, use: np.ndarray, names: np.ndarray, swing: np.ndarray):
+    """Of every (a, b) (C, 2): means (C, p), their information (C, p, p), and log of the best and of the integral over the unknowns."""
+    p, columns = int(use.sum()), len(use)
     T = np.zeros((len(swing), columns, p))
-    T[:, np.flatnonzero(kept), np.arange(p)] = 1.0
-    within = np.searchsorted(np.flatnonzero(kept), np.flatnonzero(drag))
-    for part, share in ((cos, swing[:, 0]), (sin, swing[:, 1])):
-        for row, column in zip(np.flatnonzero(part), within, strict=True):
-            T[:, row, column] = share
-    N = np.swapaxes(T, 1, 2) @ info[1:, 1:] @ T + np.eye(p)
+    T[:, np.flatnonzero(use), np.arange(p)] = 1.0
+    if use[names == "drag"].any():
+        within = np.searchsorted(np.flatnonzero(use), np.flatnonzero(names == "drag"))
+        for part, share in zip(("drag cos", "drag sin"), swing.T, strict=True):
+            for row, column in zip(np.flatnonzero(names == part), within, strict=True):
+                T[:, row, column] = share
+    N = np.swapaxes(T, 1, 2) @ (info[1:, 1:] @ T) + np.eye(p)
     g = info[1:, 0] @ T
     root = np.linalg.cholesky(N)
     x = np.linalg.solve(N, g[:, :, None])[:, :, 0]
     best = -0.5 * (info[0, 0] - np.sum(g * x, axis=1))
-    evidence = best - np.sum(np.log(np.diagonal(root, axis1=1, axis2=2)), axis=1)
-    return x, np.linalg.inv(N), (best, evidence)
+    return x, N, best, best - np.sum(np.log(np.diagonal(root, axis1=1, axis2=2)), axis=1)

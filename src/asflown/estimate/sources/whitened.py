@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from .gather import Arc
 
 #: The slow torque is at least this share of the torque seen: no model of field, light and air is better. Assumed.
-_LEAST = 0.01
+_LEAST = 0.003
 #: Bounds of its time constant. [s]
 _SHORTEST_S = 30.0
 #: A reading this many sigmas from the rest is left out.
@@ -37,7 +38,7 @@ class Levels:
 class Whitened:
     """Readings and columns in units of their own noise, independent of each other.
 
-    y (M,), X (M, p) per sigma of each unknown; three rows a block, x y z; ``normal`` (p, p) and ``moment`` (p,) without prior."""
+    ``E`` (M, 1 + p): y and the columns per sigma of each unknown; three rows a block, x y z; ``information``: E^T E, without prior."""
 
     arc: Arc
     levels: Levels
@@ -45,9 +46,13 @@ class Whitened:
     filtered: Filtered
     kept: np.ndarray
 
-    @property
+    @cached_property
     def E(self) -> np.ndarray:
         return self.filtered.innovation / np.sqrt(self.filtered.variance)[:, None]
+
+    @cached_property
+    def information(self) -> np.ndarray:
+        return self.E.T @ self.E
 
     @property
     def log_size(self) -> float:

@@ -71,6 +71,8 @@ SHADOW_APART = Kind(
     "shadow. The sensor is believed",
     "Check orbit_position and the epoch; a sun vector of zero must mean shadow, not a Sun outside the sensor's view.",
 )  # fmt: skip
+#: Those about the Sun alone.
+OF_THE_SUN = (SUN_APART, SHADOW_APART)
 
 
 def sky_doubts(telemetry: Telemetry, craft: Craft | None = None) -> Doubts:

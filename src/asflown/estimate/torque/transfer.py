@@ -65,7 +65,8 @@ NOT_HELD = Kind(
 )  # fmt: skip
 WHITE_NOISE_ONLY = Kind(
     "torque.white-noise-only", Severity.CAUTION,
-    "the band of the transfer method holds white noise only: slow (correlated) error of the attitude estimate is not in it",
+    "the band of the transfer method holds white noise and the inertia's sigma only: slow (correlated) error of the attitude estimate "
+    "is not in it",
     "Use --method fused.",
 )  # fmt: skip
 
@@ -150,6 +151,8 @@ class Transfer(Method):
             torque = -(acceleration * np.diag(I_B) + push * np.diag(J))
         else:
             torque = -np.diag(I_B) / gain * (acceleration + push)
+        # the whole torque that the loop tells is in proportion to the inertia
+        variance = variance / gain**2 + (subject.inertia_share * torque) ** 2
         followed = len(channels) == 3 and tlm.members("wheel_rate") and not subject.relative
         turning = followed and law.gyroscopic is not None and tlm.has_axes("body_rate")
         if followed:
@@ -159,8 +162,8 @@ class Transfer(Method):
         told_by_error = told_by_error[np.isfinite(told_by_error).all(axis=1)]
         moves = subject.slewing or (turns(tlm) and not turning) or changes_as_in_a_slew(told_by_error)
         return Answer(
-            by=self, grid=grid, torque_Nm=torque, sigma_Nm=np.sqrt(variance) / gain,
-            settings={"half_width_s": width, "degree": 3, "model": self.taken},
+            by=self, grid=grid, torque_Nm=torque, sigma_Nm=np.sqrt(variance),
+            settings={"half_width_s": width, "degree": 3, "model": self.taken, "inertia_share": subject.inertia_share},
             doubts=Doubts([*gap_doubts(tlm, grid, silent), NOT_HELD() if moves else None, WHITE_NOISE_ONLY()]),
         )  # fmt: skip
 
