@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from asflown.craft.model import Drag
 from asflown.sim import scenario
 from asflown.sim.mission import mission
 from asflown.telemetry import dictionary
@@ -29,7 +30,7 @@ def section(text: str, heading: str) -> str:
 def keys_in(text: str) -> set[str]:
     """Words in code marks in the key column (the second) of the tables."""
     rows = [line.split(" | ") for line in text.splitlines() if line.startswith("|")]
-    return {k for cells in rows if len(cells) > 2 for k in re.findall(r"`([a-z_]+)`", cells[1])}
+    return {k for cells in rows if len(cells) > 2 for k in re.findall(r"`([a-z_][a-z0-9_]*)`", cells[1])}
 
 
 def code_blocks(text: str, language: str) -> list[str]:
@@ -79,7 +80,8 @@ def test_simulator_page_lists_every_scenario_key():
     models = (scenario.Scenario, scenario.Triangles, scenario.Constant, scenario.Table, scenario.Plume, scenario.Passage, scenario.Slew,
               scenario.Coast, scenario.DragSpike, scenario.CoverMotion, scenario.Controller, scenario.Sampling, scenario.Gap,
               scenario.ThrusterUse, scenario.CatalystBeds, scenario.ThrusterFault, scenario.WheelBias, scenario.Burn,
-              scenario.ThrusterControl, scenario.BranchSwap)  # fmt: skip
+              scenario.ThrusterControl, scenario.BranchSwap, scenario.OrbitFlown, scenario.Environment, scenario.Pointing,
+              scenario.Unloading, scenario.Sensors, scenario.NullSpace, scenario.DragGrowth, Drag)  # fmt: skip
     tables = {
         "slews",
         "coasts",
@@ -96,11 +98,19 @@ def test_simulator_page_lists_every_scenario_key():
         "branch_swaps",
         "wheel_biases",
         "burns",
+        "orbit",
+        "environment",
+        "pointings",
+        "unloading",
+        "sensors",
+        "null_space",
+        "drag_growth",
+        "wheel_drag",
     }  # named in the first column
     fields = {k for m in models for k in m.model_fields} - tables
     text = section(page("simulator.md"), "Scenario keys")
     assert keys_in(text) == fields
-    assert all(re.search(rf"\[[a-z.\[]*{t}\]", text) for t in tables | {"torques"})
+    assert all(re.search(rf"\[[a-z.\[]*{t}[\].]", text) for t in tables | {"torques"})
 
 
 def test_simulator_page_lists_every_mission_key():

@@ -28,6 +28,8 @@ _PUBLIC = {
     "OnTimes": "asflown.estimate.torque",
     "external_torque": "asflown.estimate.external",
     "ExternalTorqueResult": "asflown.estimate.external",
+    "sources": "asflown.estimate.sources",
+    "SourcesResult": "asflown.estimate.sources",
     "density": "asflown.estimate.density",
     "DensityResult": "asflown.estimate.density",
     "jets": "asflown.estimate.jets",
@@ -150,6 +152,7 @@ if TYPE_CHECKING:
     )
     from asflown.estimate.jets import JetsResult, jets
     from asflown.estimate.leak import LeakResult, LeakWatch, leak, leak_known
+    from asflown.estimate.sources import SourcesResult, sources
     from asflown.estimate.thrust import ThrustResult, thrust
     from asflown.estimate.torque import (
         Fused,

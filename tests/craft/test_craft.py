@@ -144,3 +144,29 @@ def test_thrust_falls_with_the_tank_and_steps_at_its_recharge():
     assert [at("1997-01-01"), at("2004-06-30"), at("2005-01-14")] == [0.97, 0.75, 0.69]
     assert 0.75 < at("2001-01-01") < 0.97
     assert at("2006-04-14") == 0.69 and at("2006-04-15") == at("2008-01-01") == 1.01
+
+
+def _law(tmp_path, **keys):
+    said = {"bandwidth": '"0.03 Hz"', "damping": "0.8"} | keys
+    (tmp_path / "c.toml").write_text(
+        'name = "c"\n[wheel_controller]\n' + "\n".join(f"{k} = {v}" for k, v in said.items())
+    )
+    return load_craft(tmp_path / "c.toml").wheel_controller
+
+
+def test_law_frequencies_are_in_hertz_or_radians_a_second(tmp_path):
+    section = '{{ natural_frequency = "{}", damping = 0.7 }}'
+    a = _law(tmp_path, bandwidth='"0.5 Hz"', rate_filter=section.format("2 Hz"))
+    b = _law(tmp_path, bandwidth=f'"{np.pi} rad/s"', rate_filter=section.format(f"{4 * np.pi} rad/s"))
+    assert (a.kp_per_s, a.kd_per_s) == pytest.approx((b.kp_per_s, b.kd_per_s))
+    assert a.rate_filter.natural_frequency == pytest.approx(b.rate_filter.natural_frequency) == pytest.approx(4 * np.pi)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "told"),
+    [("bandwidth", "0.03", "no unit"), ("bandwidth", '"2 deg"', "deg"), ("inertia", '"1 1 5 0 0 0 kg m2"', "no rigid body"),
+     ("gyroscopic", '"sometimes"', "gyroscopic")],
+)  # fmt: skip
+def test_a_law_that_cannot_be_is_refused(tmp_path, key, value, told):
+    with pytest.raises(BadInput, match=told):
+        _law(tmp_path, **{key: value})

@@ -94,7 +94,7 @@ def small_body():
     empty = np.empty(0)
     return Plant(
         np.array([[3.0, 0.2, 0.1], [0.2, 2.0, -0.1], [0.1, -0.1, 1.5]]), np.eye(3), np.full(3, 0.05),
-        np.zeros((3, 3)), np.array([[0.7, 0.1, 0.0]]), np.array([0.05]), np.array([4.0]),
+        np.tile([0.0, 0, 0, 1], (3, 1)), np.array([[0.7, 0.1, 0.0]]), np.array([0.05]), np.array([4.0]),
         empty, np.empty((0, 3)), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((3, 3)), 0.0, empty, np.empty((5, 0)),
     )  # fmt: skip
 
@@ -106,7 +106,7 @@ def test_law_runge_kutta_is_of_fourth_order():
     plant, ends = small_body(), []
     for steps in (80, 160, 320, 2560):
         x = TUMBLING.copy()
-        advance(0.0, x, MOTORS, np.zeros(3), plant, 4.0 / steps, steps, np.empty((5, len(x))))
+        advance(0.0, x, MOTORS, np.zeros(3), np.zeros(3), plant, 4.0 / steps, steps, np.empty((5, len(x))))
         ends.append(x[:12])
     errors = [np.abs(x - ends[-1]).max() for x in ends[:3]]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
@@ -125,7 +125,7 @@ def test_law_energy_balances_with_a_heavy_mode():
                 + w @ plant.coupling[0] * eta_dot + 0.5 * eta_dot**2 + 2.0 * eta**2)  # fmt: skip
 
     before = held(x)
-    advance(0.0, x, MOTORS, np.zeros(3), plant, 0.001, 20_000, np.empty((5, len(x))))
+    advance(0.0, x, MOTORS, np.zeros(3), np.zeros(3), plant, 0.001, 20_000, np.empty((5, len(x))))
     by_torque, by_motors, in_bearings, in_modes = x[12:]
     assert by_torque == 0 and in_bearings == 0 and in_modes > 1e-3
     assert abs(held(x) - before - by_motors + in_modes) < 1e-8 * in_modes

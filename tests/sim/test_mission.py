@@ -166,7 +166,7 @@ def test_law_momentum_per_rate_is_the_plants():
     scenario = load_scenario("cover-stow")
     now = CASSINI.at(scenario.epoch_ns)
     part = moving_part(scenario.cover, now)
-    plant, times = _plant(scenario, now, part), np.array([90.0, 150.3, 230.7])
+    plant, times = _plant(scenario, now, part, None, 0.125), np.array([90.0, 150.3, 230.7])
     angle, momentum, _ = moving_part_history(times, np.zeros((3, 3)), plant)
     rate = np.array([moving_part_motion(t, plant.motion_time, plant.motion_angle)[1] for t in times])
     assert momentum == pytest.approx(momentum_per_rate(part, angle) * rate[:, None], abs=1e-12)

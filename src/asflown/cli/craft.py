@@ -66,9 +66,8 @@ def show(
               f"  {t.nominal_thrust:g} N")  # fmt: skip
     for timing, names in _by_timing(c.thrusters).items():
         print(wrapped("                ", f"delay, rise, fall {timing} ms: {', '.join(names)}"))
-    if k := c.wheel_controller:
-        print(f"  wheel controller: {k.bandwidth:g} Hz, damping {k.damping:g}, KP {k.kp_per_s:.6f} 1/s, KD {k.kd_per_s:.6f} 1/s\n"
-              f"                    {_filter(k)}, {'period not known' if k.period is None else f'every {k.period:g} s'}")  # fmt: skip
+    if c.wheel_controller:
+        _print_law(c.wheel_controller)
     for m in c.mechanisms:
         print(
             f"  mechanism {m.name}: {m.mass:g} kg at ({m.from_cm[0]:+.3f} {m.from_cm[1]:+.3f} {m.from_cm[2]:+.3f}) m from the centre of mass"
@@ -76,9 +75,26 @@ def show(
     print_doubts(now.doubts)
 
 
+def _print_law(k) -> None:
+    period = "period not known" if k.period is None else f"every {k.period:g} s"
+    print(f"  wheel controller: {k.bandwidth:g} Hz, damping {k.damping:g}, KP {k.kp_per_s:.6f} 1/s, KD {k.kd_per_s:.6f} 1/s\n"
+          f"                    {_filter(k)}, {period}")  # fmt: skip
+    if said := _fed(k):
+        print(wrapped(" " * 20, said))
+
+
 def _filter(law) -> str:
     f = law.rate_filter
     return "no rate filter" if f is None else f"rate filter {f.natural_frequency:g} rad/s, damping {f.damping:g}"
+
+
+def _fed(law) -> str:
+    """What the file says of feed-forward, tracking and the controller's inertia; '' where it says nothing."""
+    terms = {"w x H": law.gyroscopic, "inertia x commanded acceleration": law.acceleration}
+    said = [f"{what} {'fed' if yes else 'not fed'} forward" for what, yes in terms.items() if yes is not None]
+    said += [] if law.tracking else ["the commanded rate is not tracked"]
+    said += [] if law.inertia is None else [f"inertia {' '.join(f'{v:g}' for v in law.inertia)} kg m2"]
+    return ", ".join(said)
 
 
 def _by_timing(thrusters) -> dict[str, list[str]]:
@@ -161,6 +177,8 @@ def _of_filter(craft, what: str):
 
 
 def _record(c, now, at) -> dict:
+    from ..craft.model import tensor
+
     inertia = plain(now.inertia_kgm2)
     return {
         "craft": c.name,
@@ -176,7 +194,9 @@ def _record(c, now, at) -> dict:
             "bandwidth_Hz": c.wheel_controller.bandwidth, "damping": c.wheel_controller.damping,
             "kp_per_s": c.wheel_controller.kp_per_s, "kd_per_s": c.wheel_controller.kd_per_s,
             "filter_rad_s": _of_filter(c, "natural_frequency"), "filter_damping": _of_filter(c, "damping"),
-            "period_s": c.wheel_controller.period,
+            "period_s": c.wheel_controller.period, "gyroscopic": c.wheel_controller.gyroscopic,
+            "acceleration": c.wheel_controller.acceleration, "tracking": c.wheel_controller.tracking,
+            "inertia_kg_m2": None if c.wheel_controller.inertia is None else plain(tensor(c.wheel_controller.inertia)),
         },
         "center_of_mass_m": c.center_of_mass,
         "center_of_mass_assumed_m": c.center_of_mass_assumed,

@@ -98,7 +98,7 @@ class Job:
         inputs: Iterable[Input] = (),
         options: dict | None = None,
         more: dict | None = None,
-        entry: Callable[[Estimate, str | None], Entry] | None = None,
+        entry: Callable[[Estimate, str | None], Entry | list[Entry]] | None = None,
         figures: Callable[[Any], dict] | None = None,
         text: Callable[[], None] | None = None,
         failed: bool = False,
@@ -106,7 +106,7 @@ class Job:
         """Keep, write, draw and tell a result, in this order.
 
         ``inputs``: files beside telemetry, dictionary, exclusions and craft; ``options``: settled values in place of those
-        given, such as the method chosen; ``more``: further keys of the JSON; ``entry``: makes the store's entry of the result
+        given, such as the method chosen; ``more``: further keys of the JSON; ``entry``: makes the store's entry, or entries, of the result
         and the name given; ``figures``: all figures by name, for --plot-dir; ``text``: prints more after the table;
         ``failed``: a check failed, which ends the program with exit code 3."""
         result = replace(
@@ -177,12 +177,12 @@ class Job:
             for path in save_figures(figures(result), plot_dir):
                 say(f"wrote {path}")
 
-    def _keep(self, entry: Entry) -> None:
+    def _keep(self, entries: Entry | list[Entry]) -> None:
         from ..trends.store import TrendStore
 
         with TrendStore.open(self.given["store"]) as trends:
-            kept = trends.add(entry)[0]
-        say(f"kept as {kept.event}, revision {kept.revision}")
+            for kept in trends.add(entries):
+                say(f"kept as {kept.event}, revision {kept.revision}")
 
     def _check_places(self) -> None:
         """Before the work: whether what it makes can be written."""

@@ -23,6 +23,7 @@ from . import (
     leak,
     report,
     simulate,
+    sources,
     telemetry,
     thrust,
     torque,
@@ -37,6 +38,7 @@ app.command("wheels", short_help="Bearing drag and use of the wheels.")(wheels.w
 app.command("external-torque", short_help="The steady external torque, from the momentum gained.")(
     external_torque.external_torque
 )
+app.command("sources", short_help="What the torque is made of: dipole, sunlight, drag.")(sources.sources)
 app.command("density", short_help="Density of the gas met in a flyby, from its torque.")(density.density)
 app.command("jets", short_help="Jets of a plume, from the momentum they transfer.")(jets.jets)
 app.command("leak", short_help="Leaking and weak thrusters, from residual momentum.")(leak.leak)

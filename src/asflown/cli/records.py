@@ -90,6 +90,20 @@ class ThrusterRecord(TypedDict):
     branch: str
 
 
+class WheelControllerRecord(TypedDict):
+    bandwidth_Hz: Number
+    damping: Number
+    kp_per_s: Number
+    kd_per_s: Number
+    filter_rad_s: Number
+    filter_damping: Number
+    period_s: Number
+    gyroscopic: Annotated[bool | None, Doc("whether w x H is fed forward; null: not said")]
+    acceleration: Annotated[bool | None, Doc("whether inertia x commanded acceleration is; null: not said")]
+    tracking: Annotated[bool, Doc("whether the rate's error is against the commanded rate")]
+    inertia_kg_m2: Annotated[Rows | None, Doc("as the controller believes; null: the craft's own")]
+
+
 class CraftRecord(TypedDict):
     craft: str
     at: str | None
@@ -97,7 +111,7 @@ class CraftRecord(TypedDict):
     inertia_per_spin_inertia: Rows | None
     wheels: list[WheelRecord]
     thrusters: list[ThrusterRecord]
-    wheel_controller: dict[str, Number | None] | None
+    wheel_controller: WheelControllerRecord | None
     center_of_mass_m: Vector | None
     center_of_mass_assumed_m: Vector | None
 

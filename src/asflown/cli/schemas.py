@@ -22,6 +22,7 @@ _RESULTS = {
     "inertia plan": ("estimate.inertia", "SlewPlanResult"),
     "inertia history": ("estimate.inertia", "InertiaHistoryResult"),
     "external-torque": ("estimate.external", "ExternalTorqueResult"),
+    "sources": ("estimate.sources", "SourcesResult"),
     "density": ("estimate.density", "DensityResult"),
     "jets": ("estimate.jets", "JetsResult"),
     "leak": ("estimate.leak", "LeakResult"),

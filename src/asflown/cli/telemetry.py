@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import typer
@@ -26,14 +27,20 @@ def check(
 ) -> None:
     """Check a telemetry file channel by channel, and report what is wrong with it.
 
-    Exit code 3 where the data need inspection before use: a doubted unit, spikes, a stuck sensor, an
+    A measured magnetic field and Sun are held against IGRF, the ephemeris and the Earth's shadow, where orbit, attitude and epoch
+    are known.
+
+    Exit code 3 where the data need inspection before use: a doubted unit, attitude or rates in other axes, spikes, a stuck sensor, an
     undeclared wrap, quaternions without unit length, one time stamp with two different values.
     Dropouts, gaps, repeats, duplicates and late samples are reported and handled, exit code 0."""
+    from ..estimate.subject import sky_doubts
     from ..telemetry.load import load_telemetry
     from ..telemetry.screening import needs_a_look, summaries
 
     ship = craft_from(craft, inertia, cm) if craft else None
     t = load_telemetry(file, channels=channels, exclude=exclude, craft=ship).between(start, stop)
+    look = needs_a_look(t)
+    t = replace(t, doubts=t.doubts + sky_doubts(t, ship))
     lines = summaries(t)
     if json:
         options = {"channels": channels, "exclude": exclude, "craft": craft, "inertia": inertia, "cm": cm, "start": start,
@@ -44,7 +51,7 @@ def check(
         )
     else:
         _print(t, lines)
-    if needs_a_look(t):
+    if look:
         raise typer.Exit(3)
 
 

@@ -35,14 +35,17 @@ def abilities(craft: Craft) -> tuple[Ability, ...]:
     thrusters = "" if craft.thrusters else "no [[thrusters]]"
     center = "" if craft.stated_center else "no center_of_mass: taken as the middle of the thrusters"
     loop = "" if craft.wheel_controller else "no [wheel_controller]: the actuators' action is taken as measured"
-    drag = "" if craft.aerodynamics else "no [aerodynamics]: needs --area and --arm"
+    drag = "" if craft.aerodynamics and craft.aerodynamics.in_flyby else "no drag of a flyby in [aerodynamics]"
+    orbit = "" if craft.orbit else "no [orbit]: needs orbit_position_x|y|z"
+    known = _known_note(craft)
     return (
-        _ability("torque", no_inertia, inertia, no_wheels, loop),
+        _ability("torque", no_inertia, inertia, no_wheels, loop, known),
         _ability("wheels", "" if craft.wheels else "no [[wheels]]"),
         _ability("inertia", "" if craft.wheels else "no [[wheels]]", _spin_note(craft)),
-        _ability("external-torque", no_inertia, inertia, no_wheels),
-        _ability("density", no_inertia, inertia, drag),
-        _ability("jets", no_inertia, inertia),
+        _ability("external-torque", no_inertia, inertia, no_wheels, known),
+        _ability("sources", no_inertia, inertia, no_wheels, orbit, _not_described(craft)),
+        _ability("density", no_inertia or drag, inertia),
+        _ability("jets", no_inertia or drag, inertia),
         _ability("leak", thrusters or no_inertia, inertia, center),
         _ability("thrust", thrusters or no_inertia, inertia, center),
     )
@@ -61,3 +64,26 @@ def _inertia_note(craft: Craft) -> str:
 
 def _spin_note(craft: Craft) -> str:
     return "spin inertia unknown: answers per unit of it" if any(w.spin_inertia is None for w in craft.wheels) else ""
+
+
+def _known_note(craft: Craft) -> str:
+    """Which torques of the surroundings the file describes, as --with takes them."""
+    air = craft.aerodynamics
+    described = {
+        "gravity-gradient": craft.orbit, "sunlight": craft.sunlight, "dipole": craft.magnetics,
+        "drag": air is not None and air.in_orbit,
+    }  # fmt: skip
+    named = [name for name, there in described.items() if there]
+    return f"known torques (--with): {', '.join(named)}" if named else ""
+
+
+def _not_described(craft: Craft) -> str:
+    """What ``sources`` then fits without a value from before the flight."""
+    air = craft.aerodynamics
+    missing = [
+        table for table, there in (
+            ("[magnetics]", craft.magnetics), ("[sunlight]", craft.sunlight),
+            ("[aerodynamics]", air is not None and air.in_orbit),
+        ) if not there
+    ]  # fmt: skip
+    return f"no {', '.join(missing)}: fitted from the telemetry alone" if missing else ""

@@ -9,83 +9,44 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
 from ..kit.doubts import Doubt, Doubts, Kind, Severity
 from ..kit.errors import BadInput, some_of
-from ..kit.quantities import numbers, quantity
+from ..kit.quantities import quantity
 from ..kit.result import Input
-from ..kit.timeline import NS, utc_label, utc_to_tai_ns
-
-
-def _in(unit: str, count: int = 0) -> Any:
-    """A field written as text with a unit, kept as SI."""
-    parse = (lambda v: numbers(v, unit, count)) if count else (lambda v: quantity(v, unit))
-    kind: Any = tuple[(float,) * count] if count else float
-    return Annotated[kind, BeforeValidator(parse)]
-
-
-if TYPE_CHECKING:  # what the values are once loaded
-    Kilogram = float
-    Second = float
-    Newton = float
-    Pascal = float
-    Hertz = float
-    KilogramMetre2 = float
-    NewtonMetre = float
-    NewtonMetreSecond = float
-    Radian = float
-    RadianPerSecond = float
-    Metre = float
-    Metre2 = float
-    MetrePerSecond = float
-    ViscousDrag = float
-    NewtonMetrePerAmpere = float
-    MetreVector = tuple[float, float, float]
-    Direction = tuple[float, float, float]
-    ModeCoupling = tuple[float, float, float]
-    InertiaElements = tuple[float, float, float, float, float, float]
-    InertiaRatio = tuple[float, float, float, float, float, float]
-else:  # how they are written in TOML
-    Kilogram, Second, Newton, Hertz, Pascal = _in("kg"), _in("s"), _in("N"), _in("Hz"), _in("Pa")
-    KilogramMetre2, NewtonMetre, NewtonMetreSecond = _in("kg m2"), _in("N m"), _in("N m s")
-    Radian, RadianPerSecond, ViscousDrag = _in("rad"), _in("rad/s"), _in("N m s / rad")
-    NewtonMetrePerAmpere = _in("N m / A")
-    Metre, Metre2, MetrePerSecond = _in("m"), _in("m2"), _in("m/s")
-    MetreVector, Direction, ModeCoupling = _in("m", 3), _in("", 3), _in("kg(1/2) m", 3)
-    InertiaElements, InertiaRatio = _in("kg m2", 6), _in("", 6)
-
-
-def _spin_inertia(value):
-    if str(value).strip() == "unknown":
-        return None
-    inertia = quantity(value, "kg m2")
-    if inertia <= 0:
-        raise ValueError(f"{value!r} is not positive; the sign of rotation belongs to the axis")
-    return inertia
-
-
-SpinInertia = Annotated[float | None, BeforeValidator(_spin_inertia)]
-
-
-def _utc_ns(value):
-    return utc_to_tai_ns(str(value))
-
-
-Date = Annotated[int, BeforeValidator(_utc_ns)]  # int64 ns TAI
-
-
-def _share(value):
-    share = quantity(value, "")
-    if not 0 < share < 1:
-        raise ValueError(f'{value!r} is no share between 0 and 1: write 5 % as "5 %" or 0.05')
-    return share
-
-
-Share = Annotated[float, BeforeValidator(_share)]
+from ..kit.timeline import NS, utc_label
+from .fields import (
+    AngularFrequency,
+    Date,
+    Described,
+    Direction,
+    Frequency,
+    InertiaElements,
+    InertiaRatio,
+    Kilogram,
+    KilogramMetre2,
+    Metre,
+    Metre2,  # noqa: F401  as _in
+    MetrePerSecond,
+    MetreVector,
+    ModeCoupling,
+    Newton,
+    NewtonMetre,
+    NewtonMetrePerAmpere,
+    Pascal,
+    Radian,
+    RadianPerSecond,
+    Second,
+    Share,
+    SpinInertia,
+    ViscousDrag,
+    _in,  # noqa: F401  scenarios take their units from here
+)
+from .surroundings import Aerodynamics, Magnetics, OrbitElements, Sunlight, TorqueRod
 
 
 def tensor(elements) -> np.ndarray:
@@ -134,11 +95,7 @@ def _day(tai_ns: int) -> str:
     return utc_label(tai_ns)[:10]
 
 
-class _Data(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class MassProperties(_Data):
+class MassProperties(Described):
     """The inertia tensor on one date.  Entries of the same ``piece`` are interpolated.
 
     ``sigma``: one sigma of the tensor, as a share of its moments."""
@@ -170,7 +127,7 @@ class MassProperties(_Data):
         return PREDICTED_SHARE if self.sigma is None and self.basis == "predicted" else self.sigma
 
 
-class InertiaRequirement(_Data):
+class InertiaRequirement(Described):
     """How well the tensor must be known: moments as a share of themselves, products in kg m2."""
 
     moments: Annotated[float, BeforeValidator(lambda v: quantity(v, ""))] = Field(gt=0)
@@ -178,13 +135,13 @@ class InertiaRequirement(_Data):
     source: str = ""
 
 
-class PropellantUsed(_Data):
+class PropellantUsed(Described):
     date: Date
     used: Kilogram
     source: str = ""
 
 
-class Drag(_Data):
+class Drag(Described):
     """A wheel's bearing drag.  Values are assumed unless a source is given."""
 
     viscous: ViscousDrag = 0.0
@@ -193,7 +150,7 @@ class Drag(_Data):
     source: str = ""
 
 
-class Wheel(_Data):
+class Wheel(Described):
     """A reaction wheel: momentum = spin inertia x rate relative to the body, along ``axis``."""
 
     name: str
@@ -219,7 +176,7 @@ class Wheel(_Data):
         )
 
 
-class Thruster(_Data):
+class Thruster(Described):
     """A thruster: ``direction`` is that of the force on the body."""
 
     name: str
@@ -232,7 +189,7 @@ class Thruster(_Data):
     branch: str = ""
 
 
-class ThrustHistory(_Data):
+class ThrustHistory(Described):
     """Thrust on one date.  Entries of the same ``piece`` are interpolated; a recharge of the tank begins a new piece."""
 
     date: Date
@@ -241,7 +198,7 @@ class ThrustHistory(_Data):
     source: str = ""
 
 
-class BlowDown(_Data):
+class BlowDown(Described):
     """A tank without a regulator: thrust is proportional to a power of its pressure."""
 
     thrust: Newton = Field(gt=0)
@@ -254,7 +211,7 @@ class BlowDown(_Data):
         return self.pressure * (thrust_N / self.thrust) ** (1 / self.exponent)
 
 
-class ThrusterController(_Data):
+class ThrusterController(Described):
     """Thrusters fired outside a deadband of e + lead x rate error, a whole control cycle at a time."""
 
     lead: Second = Field(gt=0)
@@ -265,23 +222,40 @@ class ThrusterController(_Data):
     source: str = ""
 
 
-class RateFilter(_Data):
+class RateFilter(Described):
     """Identical second-order low-pass sections in cascade."""
 
-    natural_frequency: RadianPerSecond = Field(gt=0)
+    natural_frequency: AngularFrequency = Field(gt=0)
     damping: float = Field(gt=0)
     sections: Literal[2] = 2
 
 
-class WheelController(_Data):
-    """Proportional-derivative control on filtered rate (cover paper eqs 12, 13; see dynamics.loop)."""
+class WheelController(Described):
+    """Proportional-derivative control on the (filtered) rate, with what is fed forward (cover paper eqs 12, 13; see dynamics.loop).
 
-    bandwidth: Hertz = Field(gt=0)
+    u = D (KD (w_c - F(w)) + KD KP e)  [+ w x (J w + h)]  [+ J w_c']
+
+    u the torque on the body, e the attitude's error and w_c the commanded rate, h the wheels' momentum, J the inertia that the
+    controller believes and D its diagonal, F the rate filter."""
+
+    bandwidth: Frequency = Field(gt=0)
     damping: float = Field(gt=0)
     rate_filter: RateFilter | None = None  # None: the rate itself
     period: Second | None = Field(default=None, gt=0)  # None: not known
-    gyroscopic: bool | None = None  # whether w x H is fed forward; None: not known
-    acceleration: bool | None = None  # whether inertia x commanded acceleration is
+    gyroscopic: bool | None = None  # whether w x (J w + h) is fed forward; None: not known
+    acceleration: bool | None = None  # whether J x commanded acceleration is
+    tracking: bool = True  # whether the rate's error is against the commanded rate; else against none
+    inertia: InertiaElements | None = None  # J; None: the craft's own
+
+    @model_validator(mode="after")
+    def _possible(self):
+        if self.inertia is not None:
+            check_inertia(tensor(self.inertia), "[wheel_controller] inertia")
+        return self
+
+    def believed_kgm2(self, I_B: np.ndarray) -> np.ndarray:
+        """J (3, 3) of a craft whose own tensor is ``I_B``."""
+        return I_B if self.inertia is None else tensor(self.inertia)
 
     @property
     def natural_frequency_rad_s(self) -> float:
@@ -297,7 +271,7 @@ class WheelController(_Data):
         return 2 * self.damping * self.natural_frequency_rad_s
 
 
-class Mechanism(_Data):
+class Mechanism(Described):
     """A part that moves: a cover, a boom, an antenna."""
 
     name: str
@@ -317,17 +291,17 @@ class Mechanism(_Data):
         return tensor(self.inertia) + self.mass * (L @ L * np.eye(3) - np.outer(L, L))
 
 
-class FlexibleMode(_Data):
+class FlexibleMode(Described):
     """One appendage mode in hybrid coordinates; ``coupling`` is the row delta of d/dt(delta eta_dot)."""
 
     name: str
-    frequency: Hertz
+    frequency: Frequency
     damping: float
     coupling: ModeCoupling
     source: str = ""
 
 
-class Pendulum(_Data):
+class Pendulum(Described):
     """Propellant that sloshes: a mass on a rod, held to the middle by surface tension."""
 
     name: str
@@ -335,7 +309,7 @@ class Pendulum(_Data):
     pivot: MetreVector  # from the craft's centre of mass
     direction: Direction  # from the pivot to the mass at rest
     length: Metre = Field(gt=0)
-    frequency: Hertz = Field(gt=0)
+    frequency: Frequency = Field(gt=0)
     damping: float = Field(ge=0)
     source: str = ""
 
@@ -346,28 +320,13 @@ class Pendulum(_Data):
         return self
 
 
-class Accelerometer(_Data):
+class Accelerometer(Described):
     axis: Direction
     scale: MetrePerSecond  # per count
     source: str = ""
 
 
-class Aerodynamics(_Data):
-    """Drag of a thin gas (plume paper eq 21) in the attitude of one ``flyby``; ``moment_arm`` about ``axis``.
-
-    ``scale_sigma``: one sigma of the product C_D V^2 area arm, as a share."""
-
-    drag_coefficient: float = Field(gt=0)
-    drag_coefficient_sigma: float = Field(ge=0)
-    projected_area: Metre2 = Field(gt=0)
-    moment_arm: Metre = Field(gt=0)
-    axis: Literal["x", "y", "z"] = "z"
-    flyby: str = ""
-    scale_sigma: Annotated[float, BeforeValidator(lambda v: quantity(v, ""))] | None = Field(default=None, ge=0)
-    source: str = ""
-
-
-class Alternative(_Data):
+class Alternative(Described):
     """A named set of other published values."""
 
     spin_inertia: dict[str, SpinInertia] = Field(default_factory=dict)
@@ -375,7 +334,7 @@ class Alternative(_Data):
     source: str = ""
 
 
-class Craft(_Data):
+class Craft(Described):
     """A spacecraft.  ``at(date)`` gives it as it was on a date."""
 
     name: str
@@ -394,6 +353,10 @@ class Craft(_Data):
     slosh: tuple[Pendulum, ...] = ()
     accelerometer: Accelerometer | None = None
     aerodynamics: Aerodynamics | None = None
+    orbit: OrbitElements | None = None
+    magnetics: Magnetics | None = None
+    torque_rods: tuple[TorqueRod, ...] = ()
+    sunlight: Sunlight | None = None
     center_of_mass: MetreVector | None = None
     center_of_mass_assumed: MetreVector | None = None  # assumed, where none is known
     alternatives: dict[str, Alternative] = Field(default_factory=dict)
@@ -407,7 +370,7 @@ class Craft(_Data):
 
     @model_validator(mode="after")
     def _consistent(self):
-        for things in (self.thrusters, self.mechanisms, self.flexible_modes, self.slosh):
+        for things in (self.thrusters, self.mechanisms, self.flexible_modes, self.slosh, self.torque_rods):
             names = [t.name for t in things]
             if len(set(names)) != len(names):
                 raise ValueError(f"a name is used twice: {some_of(names)}")
@@ -426,6 +389,10 @@ class Craft(_Data):
         relative = {w.spin_inertia is None for w in self.wheels}
         if len(relative) > 1:
             raise ValueError("give the spin inertia of every wheel or of none")
+        if relative == {True} and self.wheel_controller is not None and self.wheel_controller.inertia is not None:
+            raise ValueError(
+                "[wheel_controller] inertia needs wheels of known spin_inertia: results are per unit of it"
+            )
         return self
 
     @property

@@ -21,6 +21,39 @@ _JSON = "Its keys: craft, inertia_kg_m2 (3 x 3) and wheels [{name, axis, spin_in
 _PLACEHOLDER = "the craft file still has the template's placeholders: inertia and spin inertia are no one's"
 
 
+_SURROUNDINGS = (
+    "# For the torques of an Earth orbit (sources, --with), whatever is known before flight:",
+    "# [orbit]                           # where the telemetry has no orbit_position_x, _y, _z",
+    '# body = "Earth"',
+    '# epoch = "2026-06-01T00:00:00Z"',
+    '# semi_major_axis = "6878 km"       # from the centre of the Earth',
+    "# eccentricity = 0.001",
+    '# inclination = "97.4 deg"',
+    '# ascending_node = "47 deg"',
+    '# argument_of_perigee = "90 deg"',
+    '# mean_anomaly = "0 deg"',
+    "",
+    "# [magnetics]",
+    '# residual_dipole = "0.1 0 0 A m2"',
+    '# sigma = "0.1 A m2"                # of each component',
+    "",
+    "# [[torque_rods]]",
+    '# name = "MTX"',
+    '# axis = "1 0 0"',
+    '# max_dipole = "15 A m2"',
+    "",
+    "# [sunlight]                        # torque = lit * (lever x s), s to the Sun; or facets: docs/craft.md",
+    '# lever = "0 0 1e-5 N m"',
+    '# sigma = "3e-6 N m"',
+    "",
+    "# [aerodynamics]                    # torque = lever x (-v/|v|) * density / reference_density; or facets",
+    '# lever = "0 0 1e-5 N m"',
+    '# sigma = "3e-6 N m"',
+    '# reference_density = "5e-13 kg/m3"',
+    "",
+)
+
+
 @dataclass(frozen=True)
 class Outline:
     """What a template is filled with; None: a placeholder stands there."""
@@ -93,10 +126,14 @@ def craft_template(name: str, what: Outline) -> str:
         "",
         *(line for k in range(len(what.names)) for line in _wheel(what, k)),
         "# [wheel_controller]                # the loop that holds the attitude: for torque by the fused and transfer methods",
-        '# bandwidth = "0.03 Hz"',
+        '# bandwidth = "0.03 Hz"              # or in rad/s',
         "# damping = 0.8",
         '# rate_filter = { natural_frequency = "3 rad/s", damping = 0.7 }',
         '# period = "0.25 s"',
+        "# gyroscopic = true                  # w x H is fed forward; found from the data where not said",
+        "# acceleration = true                # inertia x commanded acceleration is fed forward",
+        "# tracking = true                    # the rate's error is against the commanded rate",
+        '# inertia = "10 12 9 0 0 0 kg m2"    # that the controller believes, where it is not the above',
         "",
         "# [[thrusters]]                     # for thrust and leak; direction is that of the force on the body",
         '# name = "T1"',
@@ -104,6 +141,7 @@ def craft_template(name: str, what: Outline) -> str:
         '# direction = "0 0 1"',
         '# nominal_thrust = "0.5 N"',
         "",
+        *_SURROUNDINGS,
     ])  # fmt: skip
 
 

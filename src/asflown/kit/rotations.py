@@ -60,3 +60,49 @@ def lvlh_to_inertial(position_N, velocity_N) -> Rotation:
     y = -np.cross(r, v)
     y /= np.linalg.norm(y, axis=1, keepdims=True)
     return Rotation.from_matrix(np.stack([np.cross(y, z), y, z], axis=2))
+
+
+def angle_between(a, b) -> np.ndarray:
+    """Angles between vectors, (N, 3) each. [rad]"""
+    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.sum(np.multiply(a, b), axis=-1))
+
+
+#: Directions span a plane, so that a rotation is told by them, where the second singular value is this share of the first.
+_SPANS = 0.02
+
+
+def best_rotation(a, b) -> tuple[Rotation, bool]:
+    """The rotation that turns vectors b nearest to a, (N, 3) each, by least squares, and whether they tell it.
+
+    Wahba's problem by singular values (Markley 1988).  Vectors of one direction leave the turn about it open: the smallest is given."""
+    u, size, v = np.linalg.svd(np.einsum("ni,nj->ij", a, b))
+    told = bool(size[1] > _SPANS * size[0])
+    if not told:
+        x, y = u[:, 0] * size[0], v[0]
+        x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)
+        axis = np.cross(y, x)
+        if np.linalg.norm(axis) < 1e-9:  # alike, or opposite: about any axis across
+            axis = np.cross(y, np.eye(3)[np.argmin(np.abs(y))])
+        return Rotation.from_rotvec(angle_between(y, x) * axis / np.linalg.norm(axis)), False
+    flip = np.diag([1.0, 1.0, np.linalg.det(u) * np.linalg.det(v)])
+    return Rotation.from_matrix(u @ flip @ v), True
+
+
+def words_of(turn: Rotation) -> str:
+    """A rotation in words: '90 deg about +z, (x, y, z) -> (-y, x, z)'."""
+    v = turn.as_rotvec()
+    angle = float(np.linalg.norm(v))
+    if angle < 1e-9:
+        return "0 deg"
+    axis, said = v / angle, ""
+    k = int(np.argmax(np.abs(axis)))
+    about = (
+        f"{'+' if axis[k] > 0 else '-'}{'xyz'[k]}" if abs(axis[k]) > 0.998 else "({:.2f}, {:.2f}, {:.2f})".format(*axis)
+    )
+    M = turn.as_matrix()
+    if np.abs(M - np.round(M)).max() < 0.1:
+        rows = [
+            f"{'-' if row[j] < 0 else ''}{'xyz'[j]}" for row, j in zip(M, np.argmax(np.abs(M), axis=1), strict=True)
+        ]
+        said = f", (x, y, z) -> ({', '.join(rows)})"
+    return f"{np.degrees(angle):.0f} deg about {about}{said}"

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 _DRAWN = {
     "ExternalTorqueResult": ("external_torque", "draw_external_torque", "save_external_torque_figure"),
     "TorqueResult": ("torque", "draw_torque", "save_torque_figure"),
+    "SourcesResult": ("sources", "draw_sources", "save_sources_figure"),
     "DensityResult": ("density", "draw_density", "save_density_figure"),
     "JetsResult": ("jets", "draw_jets", "save_jets_figure"),
     "InertiaResult": ("inertia", "draw_inertia", "save_inertia_figure"),

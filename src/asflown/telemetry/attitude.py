@@ -18,6 +18,7 @@ from ..kit.rotations import rates_between
 from ..kit.timeline import NS
 from .channels import AXES
 from .findings import ERROR_TOO_FAST, NEVER_TOGETHER, RATE_SCALE, TURNS_TOO_LITTLE
+from .frames import against_rates, commanded_doubt, readings_of
 from .telemetry import BRIDGED, Telemetry
 
 if TYPE_CHECKING:
@@ -29,7 +30,6 @@ COHERENT = 0.9  # share of the motion in common needed to compare scales
 OFF_SCALE = 1.25
 TOO_FAST = 10.0  # times the body rate: no control loop does this, a wrong unit does (57 or 1000)
 
-_CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 #: Wrong unit suggested by a rate's scale.
 MISTAKEN_UNITS = {180 / np.pi: "deg/s labelled rad/s", 1e3: "mrad/s labelled rad/s", 30 / np.pi: "rpm labelled rad/s",
                   np.pi / 180: "rad/s labelled deg/s", 1e-3: "rad/s labelled mrad/s", 1e6: "microrad/s labelled rad/s",
@@ -37,23 +37,23 @@ MISTAKEN_UNITS = {180 / np.pi: "deg/s labelled rad/s", 1e3: "mrad/s labelled rad
 
 
 def check_attitude(telemetry: Telemetry, readings: dict[str, tuple[np.ndarray, np.ndarray]] | None = None) -> Telemetry:
-    """The same telemetry, with doubts about its quaternion's direction or the rates' scale.
+    """The same telemetry, with doubts about its quaternion's direction and axes, the rates' scale, and the commanded attitude.
 
-    readings: other readings of the quaternion by name, (tai_ns (N,), q_NB (N, 4)); by default its conjugate.
+    readings: other readings of the quaternion by name, (tai_ns (N,), q_NB (N, 4)); by default its conjugate and other orders.
     Each reading's differenced rates r are compared with the body rates w up to a free positive factor (a wrong
     unit is not a wrong direction): misfit S = sum |w - s r|^2, s >= 0; the likelihood of independent residuals
     of unknown size gives (3 M / 2) ln(S / S'), M reduced by the residuals' own correlation.
     Raises BadInput where another reading fits significantly better."""
-    telemetry = _error_scale(telemetry)
+    telemetry = _commanded(_error_scale(telemetry))
     needed = [f"quaternion_{m}" for m in "wxyz"]
     if not all(n in telemetry for n in needed) or not telemetry.has_axes("body_rate"):
         return telemetry
     tai_ns, q = together(telemetry, needed)
     if readings is None:
-        readings = {"its conjugate": (tai_ns, q * _CONJUGATE)}
+        readings = {words: (tai_ns, other) for words, other in readings_of(q, _orbit(telemetry, tai_ns)).items()}
         remedy = (
-            "R(q) must take body vectors to inertial ones: negate quaternion_x, _y and _z, "
-            "or map the columns in a channel dictionary with the direction they have."
+            "R(q) must take body vectors to inertial ones, not to the orbit's: negate quaternion_x, _y and _z, or name the columns in their order; "
+            "a channel dictionary maps the columns with the direction and order they have."
         )
     else:
         remedy = "Correct [quaternion] in the channel dictionary."
@@ -74,6 +74,8 @@ def check_attitude(telemetry: Telemetry, readings: dict[str, tuple[np.ndarray, n
             channel="quaternion",
             remedy=remedy,
         )
+    if (other := against_rates(rate, w)) is not None:
+        return _scales(_doubted(telemetry, other), rate, w)
     turned = next(iter(odds))  # the conjugate comes first
     if odds[turned][0] > -SIGNIFICANT:
         telemetry = _doubted(telemetry, TURNS_TOO_LITTLE(rms_rad_s=_rms(w)))
@@ -87,6 +89,36 @@ def together(telemetry: Telemetry, names: list[str]) -> tuple[np.ndarray, np.nda
     for p in parts[1:]:
         common = np.intersect1d(common, p.tai_ns, assume_unique=True)
     return common, np.stack([p.values[np.searchsorted(p.tai_ns, common)] for p in parts], axis=1)
+
+
+def _commanded(telemetry: Telemetry) -> Telemetry:
+    """Doubt a commanded attitude that contradicts the one held."""
+    four = [f"{stem}_{m}" for stem in ("quaternion", "commanded_quaternion") for m in "wxyz"]
+    if not all(n in telemetry for n in four):
+        return telemetry
+    tai_ns, both = together(telemetry, four)
+    if not len(tai_ns):
+        return telemetry
+    told = _at(telemetry, tai_ns, "attitude_error")
+    doubt = commanded_doubt(both[:, :4], both[:, 4:], told, _orbit(telemetry, tai_ns))
+    return telemetry if doubt is None else _doubted(telemetry, doubt)
+
+
+def _orbit(telemetry: Telemetry, tai_ns: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Position and velocity at instants, (N, 3) each; None without them."""
+    position, velocity = (_at(telemetry, tai_ns, stem) for stem in ("orbit_position", "orbit_velocity"))
+    return None if position is None or velocity is None else (position, velocity)
+
+
+def _at(telemetry: Telemetry, tai_ns: np.ndarray, stem: str) -> np.ndarray | None:
+    """A vector between its samples, (N, 3), held beyond them; None without it."""
+    if not telemetry.has_axes(stem):
+        return None
+    at_ns, values = together(telemetry, [f"{stem}_{a}" for a in AXES])
+    if len(at_ns) < 2:
+        return None
+    x, at = ((v - at_ns[0]) / NS for v in (tai_ns, at_ns))
+    return np.column_stack([np.interp(x, at, column) for column in values.T])
 
 
 def _measured(telemetry: Telemetry, tai_ns: np.ndarray):

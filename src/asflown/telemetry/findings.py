@@ -47,6 +47,28 @@ RATE_SCALE = Kind(
     "{channels}: the body rates are {ratio:.4g} times those of the quaternion: {guess}",
     "Check the unit of the body rates.",
 )  # fmt: skip
+OTHER_FRAME = Kind(
+    "telemetry.attitude-other-frame", Severity.SUSPECT,
+    "the quaternion turns about other axes than the body rates: its rates fit (to {left_percent:.2g} %) if turned by {turn}.  Is it of "
+    "another body frame, such as a star tracker's mounting?",
+    "Turn the quaternion or the body rates into the craft's axes; or take a bias off the body rates.",
+)  # fmt: skip
+NO_READING = Kind(
+    "telemetry.attitude-no-reading", Severity.SUSPECT,
+    "body rates ({rates_rad_s:.2g} rad/s rms) and the turn of the quaternion ({quaternion_rad_s:.2g} rad/s) fit under no reading: not as "
+    "its conjugate, in another order, or turned into other body axes",
+    "Is the quaternion relative to the orbit's axes? It must be body to inertial. Check time stamps, and a bias of the body rates.",
+)  # fmt: skip
+COMMAND_APART = Kind(
+    "telemetry.command-apart", Severity.SUSPECT,
+    "the commanded quaternion contradicts the attitude ({off_deg:.0f} degrees, median): {how}",
+    "Give commanded_quaternion_w, _x, _y, _z body to inertial, scalar and order as of the quaternion.",
+)  # fmt: skip
+NOT_UNIT = Kind(
+    "telemetry.sun-not-unit", Severity.SUSPECT,
+    "sun_direction has a length of {length:.3g} (median where it is not zero): it must be a unit vector, or zero in shadow",
+    "Divide it by its length; zeros must mean shadow.",
+)  # fmt: skip
 
 #: Finding -> its doubt.  Findings not listed here do no harm: samples that are missing (gap, dropout),
 #: excluded by the user (excluded), or not requested (ignored).

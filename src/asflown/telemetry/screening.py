@@ -17,8 +17,8 @@ from scipy.special import pdtrc
 from ..kit.errors import BadInput
 from ..kit.scatter import MEDIAN_SIZE, difference_sigma
 from ..kit.timeline import NS, segments
-from .channels import kind_of
-from .findings import ERROR_TOO_FAST, IMPLAUSIBLE, RATE_SCALE, Finding
+from .channels import AXES, kind_of
+from .findings import ERROR_TOO_FAST, IMPLAUSIBLE, NOT_UNIT, RATE_SCALE, Finding
 from .telemetry import BRIDGED, Channel, Telemetry
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ _MEASURED = frozenset({
     "wheel_momentum", "wheel_momentum_magnitude", "orbit_position", "orbit_velocity",
 })  # fmt: skip
 
+_NOT_UNIT = 0.1  # by which a unit vector's length may be off
 #: Doubts that a unit is not the one written.
 _OF_UNITS = (IMPLAUSIBLE, ERROR_TOO_FAST, RATE_SCALE)
 
@@ -68,7 +69,7 @@ def screen(telemetry: Telemetry, craft=None) -> Telemetry:
         label_tai_ns=rows[0],
         time_labels={k: v[rows[1]] for k, v in telemetry.time_labels.items()},
         findings=(*telemetry.findings, *findings),
-        doubts=telemetry.doubts + _implausible(channels, craft),
+        doubts=telemetry.doubts + _implausible(channels, craft) + _sun_length(channels),
     )
 
 
@@ -435,6 +436,17 @@ def _implausible(channels: dict[str, Channel], craft) -> list[Doubt]:
     return doubts
 
 
+def _sun_length(channels: dict[str, Channel]) -> list[Doubt]:
+    """A sun vector that is neither zero nor of unit length."""
+    parts = [channels[n].usable for n in (f"sun_direction_{a}" for a in AXES) if n in channels]
+    if len(parts) < 3 or len({len(p.values) for p in parts}) > 1:
+        return []
+    length = np.linalg.norm([p.values for p in parts], axis=0)
+    length = length[length > 0]
+    off = np.abs(length - 1) > _NOT_UNIT
+    return [NOT_UNIT(length=float(np.median(length[off])))] if len(length) and np.mean(off) > 0.05 else []
+
+
 # ---- summary -----------------------------------------------------------------------
 
 
@@ -483,5 +495,5 @@ def summaries(telemetry: Telemetry) -> list[ChannelSummary]:
 
 
 def needs_a_look(telemetry: Telemetry) -> bool:
-    """Whether the data need inspection before use: a serious finding, or a doubted unit."""
-    return telemetry.doubts.has(*_OF_UNITS) or any(f.what in SERIOUS for f in telemetry.findings)
+    """Whether the data need inspection before use: a serious finding, or a doubt that they contradict themselves."""
+    return any(d.is_grave for d in telemetry.doubts) or any(f.what in SERIOUS for f in telemetry.findings)

@@ -46,7 +46,7 @@ def healths_in(store: str, craft: str | None, limits: list[str]) -> list[Health]
     if not kinds:
         raise BadInput(
             f"the store has no figures of merit of {name}",
-            remedy="Add some with `asflown trend add`, or with --store of `asflown wheels`, `inertia`, `thrust` or `gates`.",
+            remedy="Add some with `asflown trend add`, or with --store of `asflown wheels`, `inertia`, `thrust`, `sources` or `gates`.",
         )
     limit = limits_of(limits, entries)
     return [_judged(entries, kind, limit) for kind in kinds]

@@ -14,7 +14,7 @@ from ..kit.doubts import Doubts
 #: Kinds of actuation.
 MOVES = ("deploy", "stow")
 #: Entries of other kinds, for which rests and cycles do not count.
-RECORDS = ("wheels", "inertia", "thrust", "gates")
+RECORDS = ("wheels", "inertia", "thrust", "gates", "sources")
 #: Basis by which a figure is judged: the fused torque, or telemetry where the figure is not of the torque.
 BEST = ("fused", "telemetry")
 

@@ -8,6 +8,7 @@ import pytest
 from asflown.dynamics.environment import MU_EARTH
 from asflown.dynamics.orbit import Orbit
 from asflown.dynamics.rigid_body import elements_of
+from asflown.estimate.environment import BODY_UNKNOWN, NOT_FREE_FALL
 from asflown.estimate.inertia import consistent, gravity, record, tensor
 from asflown.estimate.inertia.linear import _slow_torque
 from asflown.estimate.inertia.tensor import inertia
@@ -83,11 +84,11 @@ def test_trap_positions_that_no_orbit_has_are_left_out_and_said(tmp_path):
         return changed(tlm, "orbit_position", lambda c: replace(c, values=np.full(len(c.values), 4e6)))
 
     result, _ = of("slews-gravity-only", tmp_path, "all", turning)
-    (said,) = result.doubts.of(gravity.NOT_FREE_FALL)
+    (said,) = result.doubts.of(NOT_FREE_FALL)
     assert "N m" in said.about["left_out"] and not result.doubts.has(gravity.GRAVITY)
     km = lambda tlm: changed(tlm, "orbit_position", lambda c: replace(c, values=c.values / 1e3))  # noqa: E731
     result, error = of("slews-gravity-only", tmp_path, "all", km)
-    assert result.doubts.has(gravity.BODY_UNKNOWN)
+    assert result.doubts.has(BODY_UNKNOWN)
     assert np.all(np.abs(error) < 3.5 * elements_of(result.inertia_sigma_random_kgm2))
 
 

@@ -15,6 +15,7 @@ from asflown.estimate.wheels.doubts import (
     MISFIT,
     NAMED_BUT_DRIVEN,
     NONE_LISTED_HERE,
+    TOO_MANY_NAMED,
     TORQUE_SCALE,
 )
 from asflown.estimate.wheels.named import NamedRunDown, named_run_downs
@@ -212,3 +213,86 @@ def test_figures_with_suspect_doubts_are_shown_and_not_judged():
     assert (len(doubted.rows), len(doubted.doubted), doubted.verdict) == (2, 8, "pass")
     assert (len(sound.rows), len(sound.doubted), sound.verdict) == (10, 0, "watch")
     assert health.doubts.has(DOUBTED)
+
+
+# ---- a month in one call ---------------------------------------------------------------------------------------
+
+
+def made_month(tmp_path):
+    """Three days of two wheels of four: one ages.  Files, craft file and list."""
+    s = 1 / np.sqrt(3)
+    axes = [(s, s, s), (-s, s, s), (-s, -s, s), (s, -s, s)]
+    text = 'name = "four"\n' + "".join(
+        f'[[wheels]]\nname = "W{k}"\naxis = "{a[0]} {a[1]} {a[2]}"\nspin_inertia = "0.01 kg m2"\n'
+        for k, a in enumerate(axes, start=1)
+    )
+    (tmp_path / "four.toml").write_text(text)
+    rng, t, rows, files = np.random.default_rng(1), np.arange(0.0, 700.0, 1.0), ["wheel,start,stop"], []
+    for day in (1, 11, 21):
+        columns = {"time [s]": t}
+        for k, c in enumerate((0.001, 0.001 * (1 + 0.01 * day)), start=1):
+            on, off = 20 + 330 * (k - 1), 20 + 330 * (k - 1) + 300
+            b, J = 1e-5, 0.01
+            x = np.clip(t, on, off) - on
+            u = (150 + c / b) * np.exp(-b * x / J) - c / b
+            columns[f"wheel_rate_W{k} [rad/s]"] = u + 0.003 * rng.standard_normal(len(t))
+            rows.append(f"W{k},2026-04-{day:02d}T00:{on // 60:02d}:{on % 60:02d},2026-04-{day:02d}T00:{off // 60:02d}:{off % 60:02d}")  # fmt: skip
+        path = tmp_path / f"day{day:02d}.csv"
+        lines = [",".join(f"{v[i]:.6f}" for v in columns.values()) for i in range(len(t))]
+        path.write_text("\n".join([f"# epoch: 2026-04-{day:02d}T00:00:00 UTC", ",".join(columns), *lines]) + "\n")
+        files.append(path)
+    (tmp_path / "list.csv").write_text("\n".join(rows) + "\n")
+    return files, tmp_path / "four.toml", tmp_path / "list.csv"
+
+
+def test_recovery_of_a_month_in_one_call(tmp_path):
+    files, vessel, listed = made_month(tmp_path)
+    words = ["wheels", *files, "--craft", vessel, "--run-downs", listed, "--store", tmp_path / "s.db"]
+    done = run(*words, "--json")
+    assert done.code == 0 and done.err.count("kept as wheels-W") == 6
+    of_each = {w["name"]: w for w in done.record["wheels"]}
+    for name, grown in (("W1", 0.0), ("W2", 0.01)):
+        assert [r["found_by"] for r in of_each[name]["run_downs"]] == ["named"] * 3
+        for r, day in zip(of_each[name]["run_downs"], (1, 11, 21), strict=True):
+            d = r["alone"]
+            assert r["start_s"] == pytest.approx((day - 1) * 86400 + (20 if name == "W1" else 350), abs=1)
+            assert abs(d["coulomb_Nm"] - 0.001 * (1 + grown * day)) < 4 * d["coulomb_sigma_Nm"] < 4e-6
+    assert of_each["W1"]["seen_s"] == 3 * 699
+    told = run("wheels", *files, "--craft", vessel, "--run-downs", listed)
+    assert told.code == 0 and told.out.count("W2") >= 4 and "Coulomb [mN m]" in told.out
+    kept = run("trend", "show", "--store", tmp_path / "s.db", "--craft", vessel, "--kind", "wheels", "--json").record
+    (aged,) = [f for f in kept["figures"] if f["figure"] == "coulomb_drag_W2"]
+    assert [r["date"][:10] for r in aged["rows"]] == ["2026-04-01", "2026-04-11", "2026-04-21"]
+
+
+@pytest.mark.parametrize(
+    ("row", "says"),
+    [
+        ("W9,2026-04-01T00:01:00,2026-04-01T00:02:00", "no wheel 'W9'"),
+        ("W1,2026-04-01T00:02:00,2026-04-01T00:01:00", "ends before it starts"),
+        ("W1,2026-05-01T00:01:00,2026-05-01T00:02:00", "outside of the telemetry"),
+        ("W1,20,320", "in seconds"),
+        ("W1,soon,later", "is not a time"),
+        ("W1,20,2026-04-01T00:02:00", "the other way round"),
+        ("W1,2026-04-01T00:09:00,2026-04-01T00:11:00", "does not slow down"),
+        ("W1,,", "lacks its wheel"),
+    ],
+)
+def test_a_bad_list_is_one_error_with_its_line(row, says, tmp_path):
+    files, vessel, listed = made_month(tmp_path)
+    good = listed.read_text().splitlines()
+    listed.write_text("\n".join([*good[:3], row]) + "\n")
+    told = complaint("wheels", *files, "--craft", vessel, "--run-downs", listed, "--store", tmp_path / "s.db")
+    assert says in told and "list.csv, line 4" in told
+
+
+def test_more_wheels_than_can_coast_are_said(tmp_path):
+    files, vessel, listed = made_month(tmp_path)
+    listed.write_text(
+        "wheel,start,stop\nW1,2026-04-01T00:00:20,2026-04-01T00:05:20\nW2,2026-04-01T00:05:00,2026-04-01T00:11:00\n"
+    )
+    done = run("wheels", *files, "--craft", vessel, "--run-downs", listed, "--json")
+    assert done.code == 0 and "wheels.too-many-named" in {d["kind"] for d in done.record["doubts_detail"]}
+    # three wheels never hold the attitude while one coasts: nothing to say
+    alone = telemetry_of(wheel_rate_RWA1=(np.arange(0, 400.0), 100 - 0.1 * np.arange(0, 400.0)))
+    assert not wheels(alone, CASSINI, run_down=("RWA1:20-300",)).doubts.has(TOO_MANY_NAMED)

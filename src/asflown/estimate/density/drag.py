@@ -126,7 +126,7 @@ def flyby_drag(craft: Craft, flyby: Flyby, given: DragGiven, variant: str = "cor
 
     Raises BadInput where drag or its axis is not known, for impossible sizes, and for a table that cannot be read."""
     air = craft.aerodynamics
-    if air is None:
+    if air is None or not air.in_flyby:
         raise BadInput(
             f"the drag of {craft.name} is not known",
             remedy="Describe it under [aerodynamics] in the craft file: drag_coefficient, projected_area, moment_arm.",

@@ -2,7 +2,8 @@
 
 Of a body at rate w = w_c + d, w_c commanded, I d' = T - w x H - I w_c' + u.  The controller's u is that of a hold on the
 deviation d, plus a feed-forward f that is known from w_c and H: with h + integral of f in place of the wheels' momentum h,
-and w x H + I w_c' - f taken off as a known torque, the model of a hold serves for any motion.
+and w x H + I w_c' - f taken off as a known torque, the model of a hold serves for any motion.  A controller that does not track
+the commanded rate holds an attitude that lags behind by F(w_c) / KP: deviations are then from that attitude.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import BSpline, make_lsq_spline, make_smoothing_spline
 from scipy.spatial.transform import Rotation, Slerp
 
+from ...dynamics.loop import filtered_rate
+from ...kit.doubts import Doubts, Kind, Severity
 from ...kit.rotations import attitude_error, rates_between, rotation, turned_by
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
@@ -29,15 +32,26 @@ _QUATERNION = [f"quaternion_{m}" for m in "wxyz"]
 _COMMANDED = [f"commanded_quaternion_{m}" for m in "wxyz"]
 #: The command of a hold is smoothed over this, and over so many times the loop's own. [s], [loop times]
 _SMOOTHED_S, _LOOP_TIMES = 300.0, 50.0
+#: The craft file is contradicted where the actuators do this many times less beside the law that feeds w x H forward, or does not.
+_PLAIN = 3.0
 #: Shortest block whose mean is smoothed. [s]
 _BLOCK_S = 10.0
+
+FED_OTHERWISE = Kind(
+    "fused.fed-otherwise", Severity.CAUTION,
+    "the craft file says that the controller {said} feed w x H forward, and its actuators say otherwise: what they slowly do is taken "
+    "from the data",
+    "Correct gyroscopic under [wheel_controller], or the inertia and wheel axes.",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Command:
     """On the grid: rates, their derivative and the feed-forward on the body, (M, 3); variance of the rates and of their derivatives (2, 3).
 
-    ``source``: where the rates are from; ``gyroscopic``, ``acceleration``: what the controller feeds forward."""
+    ``beside_Nm``: (3,), one sigma of what the actuators slowly do beside the law, which is in the feed-forward; ``source``: where
+    the rates are from; ``gyroscopic``, ``acceleration``: what the controller feeds forward; ``doubts``: where the actuators say
+    otherwise than the craft file."""
 
     seconds: np.ndarray
     rate: np.ndarray
@@ -45,9 +59,12 @@ class Command:
     feed_Nm: np.ndarray
     fed_Nms: np.ndarray  # its integral
     variance: np.ndarray
+    beside_Nm: np.ndarray
+    lag_rad: np.ndarray  # (M, 3), by which the attitude that the loop holds is behind the one commanded
     source: str
     gyroscopic: bool
     acceleration_fed: bool
+    doubts: Doubts = Doubts()
 
     def on(self, seconds: np.ndarray, values: np.ndarray, j: int) -> np.ndarray:
         return np.interp(seconds, self.seconds, values[:, j])
@@ -60,6 +77,8 @@ class Command:
         if s.row == BODY_RATE:
             off = s.values - self.on(s.seconds, self.rate, j)
             return replace(s, values=off - np.median(off))  # the sensor's bias
+        if s.row == ATTITUDE_ERROR:
+            return _less_lag(s, self.seconds, self.lag_rad[:, j])
         if s.row == MOMENTUM:
             return replace(s, values=s.values + self.on(s.seconds, self.fed_Nms, j))
         return s
@@ -95,18 +114,35 @@ def command_of(
     rate, acceleration, variance, source = _commanded(subject, grid, series, law)
     at = grid.seconds
     h = np.column_stack([np.interp(at, stored[0], stored[1][:, j]) for j in range(3)])
-    turn, push = np.cross(rate, rate @ I_B + h), acceleration @ I_B
-    gyroscopic = law.gyroscopic
-    if gyroscopic is None:
-        gyroscopic = _fed_forward(law, I_B, series, turn)
+    J, lag = law.believed_kgm2(I_B), _lag(law, rate, grid.step_s)
+    series = {j: [_less_lag(s, at, lag[:, j]) for s in of_axis] for j, of_axis in series.items()}
+    slower = np.gradient(lag, at, axis=0)
+    rate, acceleration = rate - slower, acceleration - np.gradient(slower, at, axis=0)
+    turn, push = np.cross(rate, rate @ J + h), acceleration @ J
+    without, fed_forward = _left_over(law, J, series, turn)
+    gyroscopic = fed_forward < without if law.gyroscopic is None else law.gyroscopic
+    stated, other = (fed_forward, without) if gyroscopic else (without, fed_forward)
+    doubts = Doubts([FED_OTHERWISE(said="does" if gyroscopic else "does not")] if stated > _PLAIN * other else ())
     pushed = gyroscopic if law.acceleration is None else law.acceleration
     feed = gyroscopic * turn + pushed * push
-    fed = gyroscopic * cumulative_trapezoid(turn, at, axis=0, initial=0) + pushed * (rate - rate[0]) @ I_B
+    fed = gyroscopic * cumulative_trapezoid(turn, at, axis=0, initial=0) + pushed * (rate - rate[0]) @ J
+    beside = np.zeros(3)
     for j, of_axis in series.items():
-        more = _beside(of_axis, fed[:, j], at, I_B[j, j] * law.kd_per_s, law)
+        more = _beside(of_axis, fed[:, j], at, J[j, j] * law.kd_per_s, law)
         feed[:, j], fed[:, j] = feed[:, j] + more.at(at, 1), fed[:, j] + more.at(at, 0)
-        variance[1, j] += more.variance[0] / I_B[j, j] ** 2
-    return Command(at, rate, acceleration, feed, fed, variance, source, gyroscopic, pushed)
+        beside[j] = np.sqrt(more.variance[0])
+    return Command(at, rate, acceleration, feed, fed, variance, beside, lag, source, gyroscopic, pushed, doubts)
+
+
+def _lag(law: WheelController, rate: np.ndarray, step_s: float) -> np.ndarray:
+    """By what a law that does not track lags behind the attitude commanded, (M, 3) [rad]."""
+    if law.tracking:
+        return np.zeros_like(rate)
+    return np.column_stack([filtered_rate(law, rate[:, j], step_s) for j in range(3)]) / law.kp_per_s
+
+
+def _less_lag(s: Series, seconds: np.ndarray, lag: np.ndarray) -> Series:
+    return replace(s, values=s.values - np.interp(s.seconds, seconds, lag)) if s.row == ATTITUDE_ERROR else s
 
 
 def _commanded(subject: Subject, grid: Grid, series, law: WheelController):
@@ -212,14 +248,13 @@ def _smoothing(law: WheelController, at: np.ndarray) -> tuple[int, float]:
     return max(1, round(float(at[-1]) / spacing)), max(_BLOCK_S, 2 / law.natural_frequency_rad_s)
 
 
-def _fed_forward(law: WheelController, I_B: np.ndarray, series, turn: np.ndarray) -> bool:
-    """Whether the actuators' mean action is nearer to what the law does with w x H fed forward than without."""
+def _left_over(law: WheelController, J: np.ndarray, series, turn: np.ndarray) -> tuple[float, float]:
+    """What the actuators do in the mean beside the law, without and with w x H fed forward. [N m]"""
     beside = np.zeros(3)
     for j, of_axis in series.items():
         row = {s.row: s for s in of_axis}
         h, e = row[MOMENTUM], row[ATTITUDE_ERROR]
         line = np.polynomial.Polynomial.fit(h.seconds, h.values, 1).convert().coef
-        held = I_B[j, j] * law.kd_per_s * law.kp_per_s * float(np.mean(e.values))
+        held = J[j, j] * law.kd_per_s * law.kp_per_s * float(np.mean(e.values))
         beside[j] = -line[1] - held
-    mean = turn.mean(axis=0)
-    return bool(np.linalg.norm(beside - mean) < np.linalg.norm(beside))
+    return float(np.linalg.norm(beside)), float(np.linalg.norm(beside - turn.mean(axis=0)))

@@ -110,13 +110,18 @@ def gather(
             series[j].append(of_axis)
     if loop == "measured":  # where wheels stick and tear loose, the jitter of sampling instants matters
         series = {j: [s.with_jumps() for s in of_axis] for j, of_axis in series.items()}
-    command = None
-    if loop == "modelled" and len(series) == 3 and (follow or has_command(subject)):
+    command: Command | None = None
+    if (
+        loop == "modelled"
+        and len(series) == 3
+        and (follow or has_command(subject) or not subject.controller().tracking)
+    ):
         command = command_of(subject, grid, series, (momentum.seconds, momentum.values_Nms))
         series = command.taken_off(series)
     silent = {g: c.name for c in everything for g in gaps_on_grid(c, grid)}
     carried = None if momentum.together or stored_Nms is not None else WHEELS_CARRIED()
-    doubts = Doubts([*found, not_modelled, carried, *gap_doubts(tlm, grid, silent, GAPS_BRIDGED)])
+    told = () if command is None else command.doubts
+    doubts = Doubts([*found, not_modelled, carried, *told, *gap_doubts(tlm, grid, silent, GAPS_BRIDGED)])
     return Record(grid, loop, bool(pushed), series, momentum.start, momentum.together, doubts, command)
 
 

@@ -4,10 +4,11 @@ One axis has ten states: attitude and rate of the body; the rate filter's four; 
 slow error of the attitude estimate, which the controller flies on; the torque and its slope.
 
     attitude'  = rate
-    I rate'    = T + u + w_u                     u = I KD (KP e - F(rate)),   e = -(attitude + error)
+    I rate'    = T + u + w_u                     u = J KD (KP e - F(rate)),   e = -(attitude + error)
     h'         = -u - w_u
     error'     = -error/time + w_a               a Gauss-Markov process
 
+J is the moment of inertia that the controller believes: the body's own, unless the craft file says otherwise.
 w_u is what the wheels do beside their command (gyro noise in the loop, friction, a cycle of delay): it
 moves body and wheels oppositely, so total momentum never feels it.  Measured are e, the rate and h.
 """
@@ -46,25 +47,37 @@ class LoopLevels(Levels):
 class HeldBody(Body):
     """A body whose controller is known.
 
-    ``filter_rad_s``: infinite where the rate is not filtered.  ``delay_s``: of the loop beyond its rate filter, to first order; zero but for asking what a delay would do."""
+    ``kd_per_s``: per unit of the body's inertia.  ``believes``: whether the controller's own inertia is stated, so that an error
+    of the body's changes its gains.  ``filter_rad_s``: infinite where the rate is not filtered.  ``delay_s``: of the loop beyond its rate filter, to first order; zero but for asking what a delay would do."""
 
     kp_per_s: float
     kd_per_s: float
     filter_rad_s: float
     filter_damping: float
     delay_s: float = 0.0
+    believes: bool = False
 
     STATES: ClassVar[int] = _STATES
     RATE: ClassVar[int] = _RATE
     STORED: ClassVar[int] = _STORED
-    SPREAD: ClassVar[tuple[float, ...]] = (1.5, 0.8, 0.7, 0.7, 0.7, 1.0, 0.7, 1.5)
+    # lengths of a torque: from a thruster's seconds to an orbit
+    SPREAD: ClassVar[tuple[float, ...]] = (1.5, 1.2, 0.7, 0.7, 0.7, 1.0, 0.7, 1.5)
 
     @classmethod
-    def under(cls, controller: WheelController, inertia_kgm2: float, *, wiener: bool = False) -> HeldBody:
-        f = controller.rate_filter
+    def under(
+        cls,
+        controller: WheelController,
+        inertia_kgm2: float,
+        believed_kgm2: float | None = None,
+        *,
+        wiener: bool = False,
+    ) -> HeldBody:
+        """``believed_kgm2``: the controller's moment of inertia about this axis; None: the body's own, whatever that is."""
+        f, share = controller.rate_filter, 1.0 if believed_kgm2 is None else believed_kgm2 / inertia_kgm2
         return cls(
-            inertia_kgm2=inertia_kgm2, wiener=wiener, kp_per_s=controller.kp_per_s, kd_per_s=controller.kd_per_s,
+            inertia_kgm2=inertia_kgm2, wiener=wiener, kp_per_s=controller.kp_per_s, kd_per_s=share * controller.kd_per_s,
             filter_rad_s=f.natural_frequency if f else np.inf, filter_damping=f.damping if f else 1.0,
+            believes=believed_kgm2 is not None,
         )  # fmt: skip
 
     def dynamics(self, v: LoopLevels) -> tuple[np.ndarray, np.ndarray]:
@@ -91,7 +104,9 @@ class HeldBody(Body):
         return F, Q
 
     def sensitivities(self, axis: AxisData, best: Smoothed) -> dict[str, np.ndarray]:
-        """The response to the torque under other numbers; per unit inertia the loop has the craft's own gains."""
+        """The response to the torque under other numbers.
+
+        Per unit of the body's inertia the loop has the craft's own gains, but where the controller's inertia is stated."""
         torque = self.inertia_kgm2 * best.mean[:, _TORQUE]
         here = axis.response(torque)
         stored = axis.channel == MOMENTUM
@@ -103,7 +118,8 @@ class HeldBody(Body):
         found = {
             name: (replace(axis, body=other).response(torque) - here) / step for name, (step, other) in changes.items()
         }
-        return found | {"inertia": np.where(stored, 0.0, -here), "spin_inertia": np.where(stored, here, 0.0)}
+        inertia = np.where(stored, 0.0, -here) - (found["kd"] if self.believes else 0.0)
+        return found | {"inertia": inertia, "spin_inertia": np.where(stored, here, 0.0)}
 
     def measured(self, v: LoopLevels) -> tuple[np.ndarray, np.ndarray]:
         H = np.zeros((len(ROWS), _STATES))
@@ -121,14 +137,15 @@ class HeldBody(Body):
         by_row = {s.row: s for s in series}
         h = by_row[MOMENTUM]
         push = max(usual_size(np.gradient(h.values, h.seconds)), 1e-7)
-        white = white_noise(by_row[ATTITUDE_ERROR], 1e-9)
+        white, stored = white_noise(by_row[ATTITUDE_ERROR], 1e-9), white_noise(h, 1e-6)
         return LoopLevels(
             torque_Nm=push,
             length_s=15.0,
             rate_white_rad_s=white_noise(by_row[BODY_RATE], 1e-10),
-            momentum_white_Nms=white_noise(h, 1e-6),
+            momentum_white_Nms=stored,
             error_white_rad=white,
             error_slow_rad=1.5 * white,
             error_time_s=15.0,
-            reaction_Nm_sqrt_s=max(0.05 * push, 1e-6),
+            # a third of what would make all of that noise: of a small craft w_u makes most of it, of a large one the reading
+            reaction_Nm_sqrt_s=0.3 * stored / np.sqrt(np.median(np.diff(h.seconds))),
         )

@@ -15,6 +15,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
+from ..environment import levers
 
 if TYPE_CHECKING:
     from ...dynamics.orbit import Orbit
@@ -45,13 +46,8 @@ class Surroundings:
         stream = np.einsum("nji,nj->ni", R, stream)
         angle = orbit_angle(self.orbit.at(time_s))[:, None]
         every += [stream, np.cos(angle) * stream, np.sin(angle) * stream]
-        levers = np.concatenate([_lever(u) for u in every], axis=2)
-        return cumulative_trapezoid(R @ levers, time_s, axis=0, initial=0)
-
-
-def _lever(u: np.ndarray) -> np.ndarray:
-    """p x u = C p. (N, 3) -> (N, 3, 3)"""
-    return np.swapaxes(np.cross(np.eye(3)[None], u[:, None, :]), 1, 2)
+        columns = np.concatenate([levers(u) for u in every], axis=2)
+        return cumulative_trapezoid(R @ columns, time_s, axis=0, initial=0)
 
 
 def orbit_angle(position_N: np.ndarray) -> np.ndarray:

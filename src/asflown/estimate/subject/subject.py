@@ -13,6 +13,7 @@ from ...kit.errors import BadInput, some_of
 from ...kit.timeline import utc_label
 from .activity import slews, thrusters_firing
 from .assumed import INERTIA_SHARE
+from .sky import OF_THE_SUN, sky_doubts
 
 if TYPE_CHECKING:
     from ...craft.model import Craft, CraftAt, Wheel
@@ -119,7 +120,8 @@ def subject_of(telemetry: Telemetry, craft: Craft, moving: str | None = "auto") 
     one whose angle is seen to move.  An inertia given by the user is used as given."""
     now = craft.at(telemetry.date_ns)
     given = any(m.piece == "given" for m in craft.mass_properties)
-    doubts = [*telemetry.doubts, *now.doubts]
+    # the Sun is doubted by those who use it; a field or an attitude that is wrong says that the axes are
+    doubts = [*telemetry.doubts, *now.doubts, *sky_doubts(telemetry, craft).without(*OF_THE_SUN)]
     if not telemetry.dated and not given and len(craft.mass_properties) > 1:
         doubts.append(UNDATED())
     idle = [n for n in telemetry.members("wheel_rate") if n in craft.wheel_names and now.wheel(n) is None]

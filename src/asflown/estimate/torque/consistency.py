@@ -10,7 +10,7 @@ from ...kit.doubts import Doubt, Kind, Severity
 from ...kit.errors import BadInput
 from ...telemetry.channels import AXES
 from .momentum import Momentum
-from .transfer import Transfer
+from .transfer import NOT_HELD, Transfer
 
 if TYPE_CHECKING:
     from ..subject import Subject
@@ -60,6 +60,8 @@ def consistency(subject: Subject, answer: Answer) -> list[Doubt]:
         b = ready.get("transfer") or Transfer().estimate(subject, ())
     except BadInput:
         return []  # too short for one of the two: nothing to compare
+    if b.doubts.has(NOT_HELD):
+        return []  # the attitude error then answers to the command too
     return [d for j in range(3) for d in _compared(a, b, j)]
 
 

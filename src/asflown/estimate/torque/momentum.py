@@ -6,7 +6,8 @@ enlarges pulses by 6-14 %, the smoothing takes about as much off.  The answer is
 pulses of 5-10 s come out wrong by tens of percent.
 
 ``corrected`` keeps the body's momentum (eqs 2, 3) and the transport term w x H, and takes slopes
-from local cubics of each channel at its own sample times: no spline, no differencing.
+from local cubics of each channel at its own sample times: no spline, no differencing.  Its band holds the samples' noise and
+what the inertia may be off.
 """
 
 from __future__ import annotations
@@ -140,8 +141,13 @@ class Momentum(Method):
                 torque += np.outer(f.fit.slope, direction)
                 variance += np.outer(f.variance([0, 1, 0]), direction**2)
         if rates:
-            body = fits[len(stored) : len(stored) + 3]
-            torque += np.cross(np.stack([f.fit.value for f in body], axis=1), momentum)
+            rate, acceleration = (
+                np.stack([getattr(f.fit, part) for f in fits[len(stored) : len(stored) + 3]], axis=1)
+                for part in ("value", "slope")
+            )
+            torque += np.cross(rate, momentum)
+            if I_B is not None:
+                variance += inertia_variance(I_B, subject.inertia_share, rate, acceleration)
         for j, f in enumerate(fits[len(directions) :]):
             torque[:, j] -= f.fit.value
             variance[:, j] += f.variance([1, 0, 0])
@@ -150,8 +156,25 @@ class Momentum(Method):
         doubts = Doubts([*doubts, *gap_doubts(tlm, grid, silent), _rounding(grid.step_s, torque, sigma, width, axes)])
         return Answer(
             by=self, grid=grid, torque_Nm=torque, sigma_Nm=sigma, momentum_Nms=momentum,
-            settings={"half_width_s": width, "degree": 3}, doubts=doubts,
+            settings={"half_width_s": width, "degree": 3, "inertia_share": None if I_B is None else subject.inertia_share},
+            doubts=doubts,
         )  # fmt: skip
+
+
+def inertia_variance(I_B: np.ndarray, share: float, rate: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+    """Variance of I alpha + w x (I w) that an inertia off by a share leaves. (M, 3) [N^2 m^2]
+
+    ``share``: one sigma of the moment about any axis, not of body axes alone.  The tensor is then off by L E L', with L L' the
+    tensor, moments of E of that sigma and its products of 1/sqrt(2) of it, all independent."""
+    moments, axes = np.linalg.eigh(I_B)
+    L = axes * np.sqrt(np.maximum(moments, 0.0))
+    variance = np.zeros_like(rate)
+    for j in range(3):
+        for k in range(j + 1):
+            off = np.outer(L[:, j], L[:, k])
+            off = share * (off if j == k else (off + off.T) / np.sqrt(2))
+            variance += (acceleration @ off + np.cross(rate, rate @ off)) ** 2
+    return variance
 
 
 def splined_momentum(subject: Subject) -> tuple[Grid, np.ndarray]:

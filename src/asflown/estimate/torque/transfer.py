@@ -5,7 +5,9 @@
     T = -(I/g) (e'' + d e' + k e)                          hankel: plume paper eqs 9, 10
 
 F is the rate filter: the sixth-order loop has an inverse that is no harder than the low-order one,
-with the rate filtered.  e is commanded minus estimated attitude in a hold, so the body rate is -e'.
+with the rate filtered.  e is commanded minus estimated attitude in a hold, so the body rate is -e'.  Where the controller
+believes another inertia J than the body's, J stands before all but e''.  Of a body that turns with its commanded attitude, w x H
+is added where the controller does not feed it forward.
 
 ``printed`` is the papers' method: e splined to 1 s, smoothed over 8 % of the record, differenced forward
 twice (eqs 18, 19), low-order inverse.
@@ -58,11 +60,13 @@ NOT_HELD = Kind(
     "torque.not-held", Severity.SUSPECT,
     "the attitude is not held still: the transfer method assumes a hold, and commanded rates and accelerations are not in the "
     "telemetry",
-    "Narrow the window to a hold with --start and --stop.",
+    "Narrow the window to a hold with --start and --stop; of a craft that turns with its orbit, say gyroscopic under "
+    "[wheel_controller].",
 )  # fmt: skip
 WHITE_NOISE_ONLY = Kind(
     "torque.white-noise-only", Severity.CAUTION,
-    "the band of the transfer method holds white noise only: slow (correlated) error of the attitude estimate is not in it",
+    "the band of the transfer method holds white noise and the inertia's sigma only: slow (correlated) error of the attitude estimate "
+    "is not in it",
     "Use --method fused.",
 )  # fmt: skip
 
@@ -127,8 +131,8 @@ class Transfer(Method):
         an inverse put together from them is late by up to 2 s on 10-s excursions.  The rate error is taken
         from telemetry where it is there: controller_rate_error (cover paper eq 17, plume paper eq 8), which has already
         gone through the filter, or rate_error."""
-        I_B = subject.known_inertia()
-        tlm = subject.telemetry
+        I_B, law = subject.known_inertia(), subject.controller()
+        J, tlm = law.believed_kgm2(I_B), subject.telemetry
         width = ERROR_HALF_WIDTH_S if self.window_s is None else self.window_s / 2
         channels = _errors(subject)
         told = {j: _rate_channel(tlm, AXES[j]) for j in channels}
@@ -142,18 +146,24 @@ class Transfer(Method):
             variance[:, j] = I_B[j, j] ** 2 * found.variance
         gain = 1.0 if inverse is None else inverse.gain
         if len(channels) == 3 and inverse is None:
-            torque = -(acceleration @ I_B + push * np.diag(I_B))
+            torque = -(acceleration @ I_B + push * np.diag(J))
+        elif self.taken == "low":
+            torque = -(acceleration * np.diag(I_B) + push * np.diag(J))
         else:
             torque = -np.diag(I_B) / gain * (acceleration + push)
-        if len(channels) == 3 and tlm.members("wheel_rate") and not subject.relative:
-            torque += np.cross(-rate, _wheel_momentum(subject, grid))  # in a hold the body turns at -e'
+        # the whole torque that the loop tells is in proportion to the inertia
+        variance = variance / gain**2 + (subject.inertia_share * torque) ** 2
+        followed = len(channels) == 3 and tlm.members("wheel_rate") and not subject.relative
+        turning = followed and law.gyroscopic is not None and tlm.has_axes("body_rate")
+        if followed:
+            torque += _turning(subject, grid, -rate, known=bool(turning))
         silent = {g: name for found in inverted.values() for g, name in found.gaps.items()}
         told_by_error = rate[:, list(channels)]
         told_by_error = told_by_error[np.isfinite(told_by_error).all(axis=1)]
-        moves = subject.slewing or turns(tlm) or changes_as_in_a_slew(told_by_error)
+        moves = subject.slewing or (turns(tlm) and not turning) or changes_as_in_a_slew(told_by_error)
         return Answer(
-            by=self, grid=grid, torque_Nm=torque, sigma_Nm=np.sqrt(variance) / gain,
-            settings={"half_width_s": width, "degree": 3, "model": self.taken},
+            by=self, grid=grid, torque_Nm=torque, sigma_Nm=np.sqrt(variance),
+            settings={"half_width_s": width, "degree": 3, "model": self.taken, "inertia_share": subject.inertia_share},
             doubts=Doubts([*gap_doubts(tlm, grid, silent), NOT_HELD() if moves else None, WHITE_NOISE_ONLY()]),
         )  # fmt: skip
 
@@ -264,6 +274,23 @@ def _rate_channel(tlm, axis: str):
         if f"{stem}_{axis}" in tlm:
             return tlm.channel(f"{stem}_{axis}")
     return None
+
+
+def _turning(subject: Subject, grid: Grid, deviation: np.ndarray, *, known: bool) -> np.ndarray:
+    """What the body's turn adds to the torque (M, 3): w x H less what the controller feeds forward of it, and its damping of the
+    commanded rate where it does not track that.
+
+    ``deviation``: rates about the commanded attitude (M, 3), which in a hold are the body's own; ``known``: the file says what is
+    fed forward and the body's own rates are there."""
+    h = _wheel_momentum(subject, grid)
+    if not known:
+        return np.cross(deviation, h)
+    I_B, law = subject.known_inertia(), subject.controller()
+    J = law.believed_kgm2(I_B)
+    channels = [subject.telemetry.channel(f"body_rate_{a}") for a in AXES]
+    rate = np.column_stack([fit_on_grid(c, grid, degree=3, half_width_s=HALF_WIDTH_S).fit.value for c in channels])
+    turn = np.cross(rate, rate @ I_B + h) - law.gyroscopic * np.cross(rate, rate @ J + h)
+    return turn if law.tracking else turn + law.kd_per_s * (rate - deviation) * np.diag(J)
 
 
 def _wheel_momentum(subject: Subject, grid: Grid) -> np.ndarray:

@@ -20,7 +20,7 @@ from .doubts import (
     TORQUE_SCALE,
 )
 from .motor import motor_law, steps_of
-from .result import COMMAND, FLIGHT_SOFTWARE, MOTOR_CURRENT, RUN_DOWN, WHEEL_COMMAND, DragFit, DragSamples, Spike
+from .result import COMMAND, FLIGHT_SOFTWARE, MOTOR_CURRENT, WHEEL_COMMAND, DragFit, DragSamples, Spike
 from .run_downs import CURRENT, FEWEST, NAMED, SHAPE, STICTION_RATE, Coasting, common_law
 from .samples import find_spikes, opposing
 
@@ -37,8 +37,6 @@ _EDGE = 1e-3
 _SCALE, _SCALE_SIGMAS = 0.05, 5.0
 #: Drag below this many sigma is none.
 NONE = 3.0
-#: Slow residuals this many times the noise are doubted.
-_MISFIT = 2.0
 
 
 def coasting_of(record: RecordedWheels, name: str, seen: list[Slowing]) -> tuple[Coasting | None, list[Doubt]]:
@@ -57,8 +55,8 @@ def coasting_of(record: RecordedWheels, name: str, seen: list[Slowing]) -> tuple
     if found_by == SHAPE:
         first = found.run_downs[0]
         doubts.append(FOUND_BY_SHAPE(wheel=name, run_downs=len(spans), start_s=first.start_s, stop_s=first.stop_s))
-    if found.misfit > _MISFIT**2:
-        doubts.append(MISFIT(wheel=name, ratio=float(np.sqrt(found.misfit))))
+    if (ratio := found.law.misfits) is not None:
+        doubts.append(MISFIT(wheel=name, ratio=ratio))
     return found, doubts
 
 
@@ -102,10 +100,7 @@ def _no_run_downs(record: RecordedWheels, name: str, seen: list[Slowing]) -> lis
 
 def from_run_downs(record: RecordedWheels, name: str, coasting: Coasting) -> tuple[DragFit, list[Doubt]]:
     J = record.described(name).spin_inertia
-    fit = DragFit.from_law(
-        RUN_DOWN, coasting.values, coasting.covariance, coasting.rate, scale=1.0 if J is None else J, relative=J is None
-    )
-    return fit, [PER_SPIN_INERTIA(wheel=name)] if J is None else []
+    return DragFit.of_run_downs(coasting.law, J), [PER_SPIN_INERTIA(wheel=name)] if J is None else []
 
 
 def from_motor(

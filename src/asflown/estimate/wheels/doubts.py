@@ -43,6 +43,12 @@ NAMED_BUT_DRIVEN = Kind(
     "wheel {wheel} is said to coast from {start_s:.0f} to {stop_s:.0f} s, but its motor's torque is {torque_Nm:+.2g} N m there",
     "Check the span of --run-down, and torque_constant in the craft file.",
 )  # fmt: skip
+TOO_MANY_NAMED = Kind(
+    "wheels.too-many-named", Severity.CAUTION,
+    "wheels {wheels} are said to coast together from {start_s:.0f} to {stop_s:.0f} s, more than the {most} that can while the others "
+    "hold the attitude: thrusters held it, or the spans are wrong",
+    "Check the spans of --run-down, or the list.",
+)  # fmt: skip
 NONE_LISTED_HERE = Kind(
     "wheels.none-listed-here", Severity.NOTE, "none of the run-downs named lies in this telemetry: {wheels}"
 )

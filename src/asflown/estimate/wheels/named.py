@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import csv
 import re
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from ...kit.errors import BadInput
+from ...kit.errors import BadInput, some_of
+from ...kit.timeline import utc_to_tai_ns
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Collection, Iterable
 
     from ...telemetry.telemetry import Telemetry
 
@@ -18,12 +20,48 @@ _FORMS = 'Name wheels as in "RW1,RW2", a span in seconds as in "RW3:60-240", or 
 _SPAN = re.compile(r"(?P<wheel>.+):(?P<start>[\d.]+)-(?P<stop>[\d.]+)")
 
 
-class NamedRunDown(NamedTuple):
-    """A wheel whose motor is off from ``start`` to ``stop``: seconds from the epoch, or UTC; None for the whole window."""
+@dataclass(frozen=True)
+class NamedRunDown:
+    """A wheel whose motor is off from ``start`` to ``stop``: seconds from the epoch, or UTC; None for the whole window.
+
+    ``file``, ``line``: where it is listed."""
 
     wheel: str
     start: str | float | None = None
     stop: str | float | None = None
+    file: str | None = field(default=None, compare=False)
+    line: int | None = field(default=None, compare=False)
+
+    def refused(self, what: str, remedy: str = _FORMS) -> BadInput:
+        """The error that this run-down is, with its place in its list."""
+        return BadInput(what, file=self.file, line=self.line, remedy=remedy)
+
+    def span(self, telemetry: Telemetry) -> tuple[int, int]:
+        """Its span in a record. [ns TAI]
+
+        Raises BadInput for a time that cannot be read, and one that ends before it starts."""
+        first, last = telemetry.span()
+        try:
+            a = first if self.start is None else telemetry.moment(self.start)
+            b = last if self.stop is None else telemetry.moment(self.stop)
+        except BadInput as why:
+            raise why if self.file is None else self.refused(why.what, why.remedy) from why
+        if b <= a:
+            raise self.refused(f"a run-down of wheel {self.wheel} ends before it starts")
+        return a, b
+
+    @property
+    def is_dated(self) -> bool:
+        """Whether its times are UTC."""
+        return self.start is not None and not _is_number(self.start)
+
+
+def _is_number(text: str | float) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def named_run_downs(words: Iterable[str | NamedRunDown]) -> tuple[NamedRunDown, ...]:
@@ -68,7 +106,7 @@ def _listed(path: str) -> list[NamedRunDown]:
         wheel, start, stop = ((row.get(n) or "").strip() for n in ("wheel", "start", "stop"))
         if not (wheel and start and stop):
             raise BadInput("a run-down lacks its wheel, start or stop", file=path, line=number, remedy=_FORMS)
-        found.append(NamedRunDown(wheel, start, stop))
+        found.append(NamedRunDown(wheel, start, stop, path, number))
     if not found:
         raise BadInput("this list of run-downs is empty", file=path, remedy=_FORMS)
     return found
@@ -79,11 +117,37 @@ def spans_of(named: Iterable[NamedRunDown], telemetry: Telemetry) -> dict[str, t
     first, last = telemetry.span()
     spans: dict[str, list[tuple[float, float]]] = {}
     for n in named:
-        a = first if n.start is None else telemetry.moment(n.start)
-        b = last if n.stop is None else telemetry.moment(n.stop)
-        if b <= a:
-            raise BadInput(f"a run-down of wheel {n.wheel} ends before it starts", remedy=_FORMS)
+        a, b = n.span(telemetry)
         if a <= last and b >= first:
             start, stop = (float(telemetry.seconds(x)) for x in (max(a, first), min(b, last)))
             spans.setdefault(n.wheel, []).append((start, stop))
     return {wheel: tuple(sorted(of_it)) for wheel, of_it in spans.items()}
+
+
+def check_named(named: Iterable[NamedRunDown], wheels: Collection[str]) -> None:
+    """Raises BadInput for a listed run-down of a wheel that the craft does not have, and for one that ends before it starts."""
+    for n in named:
+        if n.file is None:
+            continue
+        if n.wheel not in wheels:
+            raise n.refused(f"the craft has no wheel {n.wheel!r}", f"Its wheels: {some_of(wheels)}.")
+        try:
+            a, b = (float(x) if _is_number(x) else utc_to_tai_ns(str(x)) for x in (n.start, n.stop))  # type: ignore[arg-type]
+        except BadInput as why:
+            raise n.refused(why.what, why.remedy) from why
+        if _is_number(n.start) != _is_number(n.stop):  # type: ignore[arg-type]
+            raise n.refused("a run-down starts in seconds and stops in UTC, or the other way round")
+        if b <= a:
+            raise n.refused(f"a run-down of wheel {n.wheel} ends before it starts")
+
+
+def most_at_once(spans: dict[str, tuple[tuple[float, float], ...]]) -> tuple[list[str], float, float]:
+    """Wheels of the most that coast at one time, and when that begins and ends [s]."""
+    most: tuple[list[str], float, float] = ([], 0.0, 0.0)
+    for of_it in spans.values():
+        for start, _ in of_it:
+            beside = [(n, b) for n, others in spans.items() for a, b in others if a <= start < b]
+            names = list(dict.fromkeys(n for n, _ in beside))
+            if len(names) > len(most[0]):
+                most = (names, start, min(b for _, b in beside))
+    return most

@@ -11,7 +11,7 @@ import numpy as np
 from ...kit.errors import BadInput, some_of
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
-from .named import named_run_downs, spans_of
+from .named import check_named, named_run_downs, spans_of
 from .run_downs import Finder
 
 if TYPE_CHECKING:
@@ -28,13 +28,14 @@ _ALIGNED = 1e3
 @dataclass(frozen=True)
 class RecordedWheels:
     """``finders``: the course of each wheel that has a rate; ``run_down``: spans [s] in which a wheel's motor is off, as the user
-    says."""
+    says; ``named``: the same as named."""
 
     telemetry: Telemetry
     craft: Craft
     now: CraftAt
     finders: dict[str, Finder]
     run_down: dict[str, tuple[tuple[float, float], ...]]
+    named: tuple[NamedRunDown, ...] = ()
 
     def described(self, name: str) -> Wheel:
         """As it is in service then; a spare one as it was described last."""
@@ -107,7 +108,9 @@ def record_of(telemetry: Telemetry, craft: Craft, run_down: Collection[str | Nam
                 channel=f"wheel_rate_{name}",
                 remedy=f"Its wheels: {some_of(craft.wheel_names)}. Rename the column, or name the right --craft.",
             )
-    spans = spans_of(named_run_downs(run_down), telemetry)
+    named = named_run_downs(run_down)
+    check_named(named, craft.wheel_names)
+    spans = spans_of(named, telemetry)
     for name in spans:
         if name not in names:
             raise BadInput(
@@ -117,4 +120,4 @@ def record_of(telemetry: Telemetry, craft: Craft, run_down: Collection[str | Nam
             )
     channels = {n: telemetry.channel(f"wheel_rate_{n}") for n in names}
     finders = {n: Finder(c, telemetry.seconds(c.usable.tai_ns)) for n, c in channels.items()}
-    return RecordedWheels(telemetry, craft, craft.at(telemetry.date_ns), finders, spans)
+    return RecordedWheels(telemetry, craft, craft.at(telemetry.date_ns), finders, spans, named)

@@ -14,7 +14,7 @@ from ...kit.schema import Annotated, Doc, NotRequired, Number, Numbers, TypedDic
 from ...kit.table import Table
 
 if TYPE_CHECKING:
-    from .run_downs import RunDown
+    from .run_downs import Law, RunDown
     from .use import WheelUse
 
 RUN_DOWN, FLIGHT_SOFTWARE, COMMAND = "run-down", "flight software estimate", "command"
@@ -68,6 +68,7 @@ class RunDownRecord(TypedDict):
     samples: int
     rms_residual_rad_s: Number
     found_by: Annotated[str, Doc("named (by the user), current (the motor's is zero) or shape (guessed)")]
+    alone: Annotated[DragRecord, Doc("drag from this run-down by itself")]
 
 
 class SpikeRecord(TypedDict):
@@ -132,6 +133,14 @@ class DragFit:
             float(np.clip(covariance[0, 1] / product, -1, 1)) if product > 0 else float("nan"),
             float(at @ values), float(np.sqrt(max(at @ covariance @ at, 0.0))), float(rate), relative,
         )  # fmt: skip
+
+    @classmethod
+    def of_run_downs(cls, law: Law, spin_inertia_kgm2: float | None) -> DragFit:
+        """The drag of a wheel that slows by a law."""
+        J = spin_inertia_kgm2
+        return cls.from_law(
+            RUN_DOWN, law.values, law.covariance, law.rate, scale=1.0 if J is None else J, relative=J is None
+        )
 
     @property
     def separable(self) -> bool:
@@ -221,6 +230,10 @@ class WheelDrag:
         """Whether the drag is of run-downs that only their shape shows."""
         return bool(self.run_downs) and all(r.is_guessed for r in self.run_downs)
 
+    def alone(self, run_down: RunDown) -> DragFit:
+        """The drag from one of its run-downs by itself."""
+        return DragFit.of_run_downs(run_down.alone, self.spin_inertia_kgm2)
+
     @property
     def known_fit(self) -> DragFit | None:
         """The best way to the drag that is not guessed."""
@@ -234,7 +247,7 @@ class WheelDrag:
             "name": self.name,
             **(self.fit.record() if self.fit else _NO_FIT),
             "spin_inertia_kgm2": self.spin_inertia_kgm2,
-            "run_downs": [r.record() for r in self.run_downs],
+            "run_downs": [r.record() | {"alone": self.alone(r).record()} for r in self.run_downs],
             "spikes": None if self.spikes is None else [s.record() for s in self.spikes],
             "low_speed_dwell_s": self.use.low_speed_dwell_s,
             "zero_crossings": self.use.zero_crossings,
@@ -281,10 +294,8 @@ class WheelsResult(Estimate):
         fits = [(w.name, f) for w in self.wheels for f in w.fits]
         head = ("wheel", "from", "Coulomb [mN m]", "viscous [µN m s]", "sum [mN m]", "at [rpm]")
         relative = ("wheel", "from", "Coulomb [rad/s^2]", "viscous [1/s]", "sum [rad/s^2]", "at [rpm]")
-        run_downs = tuple(
-            (w.name, f"{r.start_s:.0f} to {r.stop_s:.0f}", f"{_RPM * r.from_rad_s:.1f} to {_RPM * r.to_rad_s:.1f}", str(len(r.time_s)))
-            for w in self.wheels for r in w.run_downs
-        )  # fmt: skip
+        several = any(len(w.run_downs) > 1 for w in self.wheels)
+        run_downs = tuple(_run_down_row(w, r, several=several) for w in self.wheels for r in w.run_downs)
         spikes = tuple(
             (w.name, f"{s.time_s:.0f}", f"{s.duration_s:.0f}", f"{1e3 * s.drag_Nm:.2f}")
             for w in self.wheels for s in (w.spikes or ())[:_MOST_SPIKES]
@@ -297,7 +308,7 @@ class WheelsResult(Estimate):
         tables = (
             Table("Drag", tuple(_fit_row(n, f, 1e3, 1e6) for n, f in fits if not f.relative), head),
             Table("Drag per unit spin inertia", tuple(_fit_row(n, f, 1.0, 1.0) for n, f in fits if f.relative), relative),
-            Table("Run-downs", run_downs, ("wheel", "time [s]", "rate [rpm]", "samples")),
+            Table("Run-downs", run_downs, _run_down_head(self.wheels, several=several)),
             Table("Drag spikes", spikes, ("wheel", "time [s]", "duration [s]", "drag [mN m]"), more),
         )  # fmt: skip
         return (use, *(t for t in tables if t.rows))
@@ -314,6 +325,23 @@ def _use_row(w: WheelDrag) -> tuple[str, ...]:
         str(u.zero_crossings),
         largest,
     )
+
+
+def _run_down_head(wheels: tuple[WheelDrag, ...], *, several: bool) -> tuple[str, ...]:
+    head = ("wheel", "time [s]", "rate [rpm]", "samples")
+    unit = "rad/s^2" if any(w.spin_inertia_kgm2 is None for w in wheels) else "mN m"
+    return (*head, f"Coulomb [{unit}]", f"sum [{unit}]", "at [rpm]") if several else head
+
+
+def _run_down_row(w: WheelDrag, r: RunDown, *, several: bool) -> tuple[str, ...]:
+    """One run-down; with ``several`` its own drag too."""
+    times, rates = f"{r.start_s:.0f} to {r.stop_s:.0f}", f"{_RPM * r.from_rad_s:.1f} to {_RPM * r.to_rad_s:.1f}"
+    row = (w.name, times, rates, str(len(r.time_s)))
+    if not several:
+        return row
+    f = w.alone(r)
+    _, _, coulomb, _, together, at = _fit_row("", f, 1.0 if f.relative else 1e3, 1.0)
+    return (*row, coulomb, together, at)
 
 
 def _fit_row(name: str, f: DragFit, scale: float, fine: float) -> tuple[str, ...]:

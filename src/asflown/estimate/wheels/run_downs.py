@@ -42,6 +42,8 @@ _CURVED, _SHARE = 5.0, (0.1, 0.95)
 _STEEP = 50.0
 #: Samples beyond this many sigma are not counted.
 _FAR = 5.0
+#: Slow residuals this many times the noise are doubted.
+_MISFIT = 2.0
 
 
 #: How a run-down is known: the user names it, the motor's current is zero, or only a bearing explains its shape.
@@ -50,7 +52,9 @@ NAMED, CURRENT, SHAPE = "named", "current", "shape"
 
 @dataclass(frozen=True)
 class RunDown:
-    """One stretch in which a wheel coasts.  ``found_by``: named (the user says so), current (the motor's is zero) or shape."""
+    """One stretch in which a wheel coasts.  ``found_by``: named (the user says so), current (the motor's is zero) or shape.
+
+    ``alone``: the law of this run-down by itself."""
 
     start_s: float
     stop_s: float
@@ -60,6 +64,7 @@ class RunDown:
     time_s: np.ndarray  # (N,), samples used
     rate_rad_s: np.ndarray  # (N,)
     fit_rad_s: np.ndarray  # (N,)
+    alone: Law
 
     @property
     def is_guessed(self) -> bool:
@@ -91,8 +96,8 @@ class RunDown:
 
 
 @dataclass(frozen=True)
-class Coasting:
-    """Constant and proportional part of the slowing of a wheel, from all its run-downs together.
+class Law:
+    """Constant and proportional part of the slowing of a wheel.
 
     ``values``: a [rad/s^2] and b [1/s]; ``covariance`` of both; ``rate``: mean |rate| of the samples [rad/s];
     ``misfit``: reduced chi square of the slow residuals, by which the covariance is widened where it is significant."""
@@ -101,6 +106,18 @@ class Coasting:
     covariance: np.ndarray
     rate: float
     misfit: float
+
+    @property
+    def misfits(self) -> float | None:
+        """Size of the slow residuals over the noise, where that is to be doubted."""
+        return float(np.sqrt(self.misfit)) if self.misfit > _MISFIT**2 else None
+
+
+@dataclass(frozen=True)
+class Coasting:
+    """All run-downs of a wheel, and the law that they have in common."""
+
+    law: Law
     run_downs: tuple[RunDown, ...]
 
 
@@ -288,7 +305,21 @@ def _farthest(good, start: int, limit: int) -> int:
 
 
 def common_law(finder: Finder, spans: list[tuple[int, int]], found_by: str) -> Coasting:
-    """One drag law for all run-downs of a wheel, each with a start rate of its own."""
+    """One drag law for all run-downs of a wheel, each with a start rate of its own; and the law of each by itself."""
+    law, keep, fits = _law(finder, spans)
+    found = []
+    for (a, b), k, fit in zip(spans, keep, fits, strict=True):
+        fit = np.sign(finder.rate[a]) * fit
+        alone = law if len(spans) == 1 else _law(finder, [(a, b)])[0]
+        found.append(RunDown(
+            float(finder.t[a]), float(finder.t[b - 1]), float(fit[0]), float(fit[-1]), found_by,
+            finder.t[a:b][k], finder.rate[a:b][k], fit[k], alone,
+        ))  # fmt: skip
+    return Coasting(law, tuple(found))
+
+
+def _law(finder: Finder, spans: list[tuple[int, int]]) -> tuple[Law, list[np.ndarray], list[np.ndarray]]:
+    """The law of some spans together; of each which samples are used, and |rate| by the law."""
     parts = [finder.span(a, b) for a, b in spans]
     keep = [np.ones(len(p.s), bool) for p in parts]
     for _ in range(5):
@@ -305,12 +336,6 @@ def common_law(finder: Finder, spans: list[tuple[int, int]], found_by: str) -> C
     total, freedom, _ = slow_misfit(used, residuals, sigma)
     # a chi square of this size is still chance, and widening for it would make the band too wide on average
     widened = total / freedom if total > chi2.isf(0.01, freedom) else 1.0
-    found = []
-    for (a, b), p, k, m in zip(spans, parts, keep, x[2:], strict=True):
-        fit = np.sign(finder.rate[a]) * coast(p.s, m, x[0], x[1])
-        found.append(RunDown(
-            float(finder.t[a]), float(finder.t[b - 1]), float(fit[0]), float(fit[-1]), found_by,
-            finder.t[a:b][k], finder.rate[a:b][k], fit[k],
-        ))  # fmt: skip
     rate = float(np.mean(np.concatenate([p.u for p in used])))
-    return Coasting(x[:2], widened * sigma**2 * inverse[:2, :2], rate, widened, tuple(found))
+    law = Law(x[:2], widened * sigma**2 * inverse[:2, :2], rate, widened)
+    return law, keep, [coast(p.s, m, x[0], x[1]) for p, m in zip(parts, x[2:], strict=True)]

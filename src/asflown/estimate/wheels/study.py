@@ -16,10 +16,20 @@ from ...kit.errors import BadInput
 from ...kit.result import recorded
 from .bases import NONE, coasting_of, from_command, from_flight_software, from_motor, from_run_downs
 from .causes import slowings
-from .doubts import BASES_DIFFER, DRAG_UNKNOWN, IN_GAPS, NEGATIVE_PART, NONE_LISTED_HERE, NOT_SEPARABLE, OVER_LIMIT
-from .named import NamedRunDown, named_run_downs
+from .doubts import (
+    BASES_DIFFER,
+    DRAG_UNKNOWN,
+    IN_GAPS,
+    NEGATIVE_PART,
+    NONE_LISTED_HERE,
+    NOT_SEPARABLE,
+    OVER_LIMIT,
+    TOO_MANY_NAMED,
+)
+from .named import NamedRunDown, most_at_once, named_run_downs
 from .record import RecordedWheels, record_of
 from .result import DragFit, WheelDrag, WheelsResult
+from .rivals import HOLDING
 from .run_downs import FEWEST, STICTION_RATE, Coasting
 from .use import wheel_use
 
@@ -74,18 +84,11 @@ def wheels(
         raise BadInput(f"the low speed {low_speed_rad_s:g} rad/s is not positive", remedy='Give it as in "300 rpm".')
     record = record_of(telemetry, craft, run_down)
     seen, followers = slowings(record)
-    coastings, doubts = {}, [*telemetry.doubts, *_unlisted(record, run_down), *followers]
+    coastings, doubts = {}, [*telemetry.doubts, *_of_named(record, run_down), *followers]
     for name in record.finders:
         coastings[name], found = coasting_of(record, name, seen[name])
         doubts += found
-        if name in record.run_down and coastings[name] is None:
-            raise BadInput(
-                "the wheel does not slow down in this window",
-                file=telemetry.source or None,
-                channel=f"wheel_rate_{name}",
-                remedy=f"A run-down takes {FEWEST} samples above {STICTION_RATE * 30 / np.pi:.0f} rpm without a gap. "
-                'Name its span, as in "RW3:60-240".',
-            )
+    _check_slowing(record, coastings)
     of_each = []
     for name in record.finders:
         wheel, found = _wheel(record, name, coastings, low_speed_rad_s)
@@ -102,10 +105,36 @@ def wheels(
     )
 
 
-def _unlisted(record: RecordedWheels, run_down) -> list[Doubt]:
-    """Whether run-downs are named, but none in this telemetry."""
+def _check_slowing(record: RecordedWheels, coastings: dict[str, Coasting | None]) -> None:
+    """Raises BadInput for a run-down that is named where the wheel does not slow down."""
+    tlm = record.telemetry
+    for n in record.named:
+        start, stop = (float(tlm.seconds(x)) for x in n.span(tlm))
+        coasting = coastings.get(n.wheel)
+        slows = coasting is not None and any(r.start_s < stop and r.stop_s > start for r in coasting.run_downs)
+        named_here = any(a < stop and b > start for a, b in record.run_down.get(n.wheel, ()))
+        if named_here and not slows:
+            raise BadInput(
+                f"wheel {n.wheel} does not slow down from {start:.0f} to {stop:.0f} s",
+                file=n.file or tlm.source or None,
+                line=n.line,
+                channel=None if n.file else f"wheel_rate_{n.wheel}",
+                remedy=f"A run-down takes {FEWEST} samples above {STICTION_RATE * 30 / np.pi:.0f} rpm without a gap. "
+                'Name its span, as in "RW3:60-240".',
+            )
+
+
+def _of_named(record: RecordedWheels, run_down) -> list[Doubt]:
+    """Whether run-downs are named, but none in this telemetry, or more at once than can be in a hold."""
     named = sorted({n.wheel for n in named_run_downs(run_down)})
-    return [NONE_LISTED_HERE(wheels=named)] if named and not record.run_down else []
+    if not record.run_down:
+        return [NONE_LISTED_HERE(wheels=named)] if named else []
+    together, start_s, stop_s = most_at_once(record.run_down)
+    most = record.count - HOLDING
+    # three wheels or fewer never hold the attitude while one coasts: that needs no word
+    if most < 1 or len(together) <= most:
+        return []
+    return [TOO_MANY_NAMED(wheels=together, start_s=start_s, stop_s=stop_s, most=most)]
 
 
 def _wheel(

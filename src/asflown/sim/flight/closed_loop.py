@@ -2,36 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...craft.load import load_craft
-from ...craft.model import Craft, CraftAt
+from ...craft.model import Craft, CraftAt, check_inertia, tensor
 from ...kit.doubts import Doubts
 from ...kit.errors import BadInput, some_of
 from ...kit.rotations import rotation
 from ...telemetry.channels import AXES
 from ..scenario import Scenario, load_scenario
-from .command import commanded_motion
-from .controllers import wheel_loop
+from .command import ordered_motion
+from .controllers import control_period, rods_of, wheel_loop
 from .cover import MovingPart, motor_telemetry, moving_part
 from .disturbances import profile_peaks, torque_table
-from .faults import coasting, drag_table
+from .faults import bearing_rows, coasting, drag_table
+from .instruments import magnetometer_error, motor_readings, orbital_readings
 from .modes import swinging
 from .passage import Passed, passed
-from .plant import Errors, Loop, Plant, Thrusters, fly_cycles, moving_part_history
+from .plant import SOURCES, Errors, Loop, Plant, Thrusters, fly_cycles, moving_part_history, outside_history
 from .sampling import axes_of, telemetry_of
-from .sensors import NOISE, STAR_TRACKER_PERIOD_S, Estimator, normal
+from .sensors import STAR_TRACKER_PERIOD_S, Estimator, noise_of, normal
 from .thrusters import (
-    ThrusterTruth,
     accelerometer_reading,
     thrust_doubts,
     thruster_readings,
     thruster_truth,
     thrusters_of,
 )
+from .truth import Truth
+from .world import Along, along_orbit, world_of
 from .write import write_flight
 
 if TYPE_CHECKING:
@@ -47,31 +49,6 @@ QUATERNION = ("w", "x", "y", "z")
 
 
 @dataclass(frozen=True)
-class Truth:
-    """What really happened, at the control instants from the epoch on; body axes unless named otherwise."""
-
-    time_s: np.ndarray  # (N,)
-    torque_Nm: np.ndarray  # (N, 3), disturbance: external torque, leaks, and the reaction of a moving part
-    attitude: np.ndarray  # (N, 4), body to inertial
-    body_rate_rad_s: np.ndarray  # (N, 3)
-    wheel_rate_rad_s: np.ndarray  # (N, wheels), relative to the body
-    wheel_momentum_Nms: np.ndarray  # (N, 3), stored, relative to the body
-    momentum_inertial_Nms: np.ndarray  # (N, 3), of everything, inertial axes
-    control_torque_Nm: np.ndarray  # (N, 3), as the controller orders it
-    motor_torque_Nm: np.ndarray  # (N, wheels), held until the next instant
-    holding_torque_Nm: np.ndarray  # (N, 3), from outside in place of coasting wheels, held until the next instant
-    estimation_error_rad: np.ndarray  # (N, 3), estimated less true attitude
-    mode_amplitude: np.ndarray  # (N, modes), hybrid coordinates [kg(1/2) m]
-    mode_rate: np.ndarray  # (N, modes)
-    ledger_J: np.ndarray  # (N, 4): work by the external torque, by the motors, lost in bearings, in modes
-    density_kgm3: np.ndarray | None  # (N,), of the gas met in a flyby
-    altitude_m: np.ndarray | None  # (N,)
-    thrusters: ThrusterTruth | None
-    cover_angle_rad: np.ndarray | None  # (N,)
-    peaks: tuple[tuple[float, float, str], ...]  # (time [s], torque [N m], axis) of the injected profile
-
-
-@dataclass(frozen=True)
 class Flight:
     """A flight that has been flown."""
 
@@ -79,7 +56,7 @@ class Flight:
     truth: Truth
     scenario: Scenario
     craft: Craft
-    inertia_kgm2: np.ndarray  # (3, 3), true, of the whole craft (a moving part where the flight began stowed)
+    inertia_kgm2: np.ndarray  # (3, 3), true (the craft is as its file has it), of the whole craft (a moving part where the flight began stowed)
     wheels: tuple[str, ...]
     seed: int
     ended: str
@@ -131,13 +108,14 @@ def fly(
     changes = (changes or {}) | {name: value for name, value in own.items() if value is not None}
     scenario = scenario.changed(**changes) if changes else scenario
     craft = craft if isinstance(craft, Craft) else load_craft(craft or scenario.craft)
-    now = craft.at(scenario.epoch_ns)
-    _check_flyable(scenario, now)
+    told = craft.at(scenario.epoch_ns)
+    _check_flyable(scenario, told)
+    now = _truly(scenario, told)
     part = moving_part(scenario.cover, now) if scenario.cover else None
     met = None
     if scenario.flyby is not None:
         met = passed(scenario.flyby, now, -scenario.settle, scenario.duration)
-    flown = _integrated(scenario, now, _plant(scenario, now, part, met), progress)
+    flown = _integrated(scenario, told, now, part, met, progress)
 
     fired = None
     if scenario.thrusters is not None:
@@ -167,34 +145,36 @@ class _Flown:
     rows: np.ndarray  # (N, columns)
     columns: _Columns
     times: np.ndarray  # (N,) control instants
+    commanded_attitude: np.ndarray  # (N, 4)
     commanded_rate: np.ndarray  # (N, 3)
     plant: Plant
+    along: Along | None
+    errors: Errors
     thrusters: Thrusters
     period_s: float
     before: int  # control cycles flown before the epoch
     ended: str
 
 
-def _integrated(scenario: Scenario, now: CraftAt, plant: Plant, progress) -> _Flown:
-    """The plant under its controllers, cycle by cycle.  Raises BadInput where the motion cannot be recorded."""
-    loop = wheel_loop(scenario, now)
-    whole_s = scenario.settle + scenario.duration
-    if whole_s / loop.period > MOST_CYCLES:
-        raise BadInput(
-            f"{whole_s:g} s are more than {MOST_CYCLES:,} control cycles of {loop.period:g} s",
-            remedy="Shorten duration and settle: everything true is kept for every cycle.",
-        )
-    before = int(np.ceil(scenario.settle / loop.period))
-    times = loop.period * np.arange(-before, round(scenario.duration / loop.period) + 1)
-    q_c, w_c, alpha_c = commanded_motion(scenario.slews, times)
-    errors = _errors(scenario, loop, len(times), len(now.wheels))
-    x = _start(scenario, now, plant, q_c[0])
-    thrusters = thrusters_of(scenario, now, times, loop.period)
-    record = np.zeros((len(times), len(x) + 18 + 3 * len(now.wheels) + 4 * len(thrusters.delay)))
-    if progress is not None:
-        progress(f"flying {scenario.name}: {whole_s:g} s in {len(times)} control cycles")
+def _integrated(scenario: Scenario, told: CraftAt, now: CraftAt, part, met, progress) -> _Flown:
+    """The plant under its controllers, cycle by cycle; ``told``: the craft as the controller knows it, ``now``: as it is.
+
+    Raises BadInput where the motion cannot be recorded."""
+    times, before = _instants(scenario, control_period(scenario, told))
     off = coasting(scenario, tuple(w.name for w in now.wheels), times)
-    flown, full = fly_cycles(plant, loop, errors, thrusters, off, q_c, w_c, alpha_c, times[0], x, record)
+    loop = wheel_loop(scenario, told, off)
+    along = along_orbit(scenario, now, times[0], times[-1], loop.period)
+    q_c, w_c, alpha_c = ordered_motion(scenario, along, times)
+    plant = _plant(scenario, now, part, met, loop.period)._replace(world=world_of(scenario, now, along))
+    errors = _errors(scenario, loop, len(times), len(now.wheels))
+    x = _start(scenario, now, plant, q_c[0], w_c[0])
+    thrusters = thrusters_of(scenario, now, times, loop.period)
+    rods = rods_of(scenario, now, loop.period)
+    columns = _Columns(len(now.wheels), plant, len(thrusters.delay))
+    record = np.zeros((len(times), columns.rods.stop))
+    if progress is not None:
+        progress(f"flying {scenario.name}: {times[-1] - times[0]:g} s in {len(times)} control cycles")
+    flown, full = fly_cycles(plant, loop, errors, thrusters, rods, off, q_c, w_c, alpha_c, times[0], x, record)
     if flown <= before:
         raise BadInput(
             f"wheel {now.wheels[full].name} is at its rate limit before the recording starts",
@@ -211,8 +191,32 @@ def _integrated(scenario: Scenario, now: CraftAt, plant: Plant, progress) -> _Fl
         ended = f"wheel {now.wheels[full].name} at its rate limit at {times[-1]:g} s"
     if progress is not None:
         progress(ended)
-    columns = _Columns(len(now.wheels), plant, len(thrusters.delay))
-    return _Flown(record[before:flown], columns, times, w_c[before:flown], plant, thrusters, loop.period, before, ended)
+    errors = errors._replace(magnetometer=errors.magnetometer[before:flown])
+    return _Flown(
+        record[before:flown], columns, times, q_c[before:flown], w_c[before:flown], plant, along, errors, thrusters, loop.period,
+        before, ended,
+    )  # fmt: skip
+
+
+def _instants(scenario: Scenario, period_s: float) -> tuple[np.ndarray, int]:
+    """Control instants (N,) [s], settling included, and how many come before the epoch.  Raises BadInput for too many."""
+    whole_s = scenario.settle + scenario.duration
+    if whole_s / period_s > MOST_CYCLES:
+        raise BadInput(
+            f"{whole_s:g} s are more than {MOST_CYCLES:,} control cycles of {period_s:g} s",
+            remedy="Shorten duration and settle: everything true is kept for every cycle.",
+        )
+    before = int(np.ceil(scenario.settle / period_s))
+    return period_s * np.arange(-before, round(scenario.duration / period_s) + 1), before
+
+
+def _truly(scenario: Scenario, told: CraftAt) -> CraftAt:
+    """The craft as it is, where the scenario says that its file is wrong."""
+    if scenario.inertia is None:
+        return told
+    inertia = tensor(scenario.inertia)
+    check_inertia(inertia, f"inertia of {scenario.name}")
+    return replace(told, inertia_kgm2=inertia)
 
 
 def _check_flyable(scenario: Scenario, now: CraftAt) -> None:
@@ -225,6 +229,10 @@ def _check_flyable(scenario: Scenario, now: CraftAt) -> None:
     asked = [("wheel_rates", n) for n in scenario.wheel_rates]
     asked += [("a coast", c.wheel) for c in scenario.coasts] + [("a drag spike", d.wheel) for d in scenario.drag_spikes]
     asked += [("a wheel bias", name) for b in scenario.wheel_biases for name in b.rates]
+    asked += [("wheel_drag", n) for n in scenario.wheel_drag] + [("drag_growth", g.wheel) for g in scenario.drag_growth]
+    balance = scenario.controller.null_space
+    asked += [("null_space", n) for n in (balance.rates if balance else ())]
+    asked += [("wheel_current_zero", n) for n in scenario.sensors.wheel_current_zero]
     for what, name in asked:
         if name not in names:
             raise BadInput(
@@ -233,9 +241,8 @@ def _check_flyable(scenario: Scenario, now: CraftAt) -> None:
             )
 
 
-def _plant(scenario: Scenario, now: CraftAt, part: MovingPart | None, met: Passed | None = None) -> Plant:
+def _plant(scenario: Scenario, now: CraftAt, part: MovingPart | None, met: Passed | None, period_s: float) -> Plant:
     coupling, natural, damping = swinging(scenario, now)
-    drag = [(w.drag.viscous, w.drag.coulomb, w.drag.stiction) if scenario.friction else (0.0,) * 3 for w in now.wheels]
     times, torques = torque_table(scenario, met)
     spike_times, spikes = drag_table(scenario, tuple(w.name for w in now.wheels))
     zero = np.zeros(3)
@@ -243,7 +250,7 @@ def _plant(scenario: Scenario, now: CraftAt, part: MovingPart | None, met: Passe
         fixed_inertia=np.ascontiguousarray(part.rest_inertia if part else now.inertia_kgm2, float),
         wheel_axes=np.array([w.axis for w in now.wheels], float),
         spin_inertia=np.array([w.spin_inertia for w in now.wheels], float),
-        drag=np.array(drag, float),
+        drag=bearing_rows(scenario, now.wheels, period_s / scenario.substeps),
         coupling=coupling,
         mode_damping=2 * damping * natural,
         mode_stiffness=natural**2,
@@ -261,17 +268,19 @@ def _plant(scenario: Scenario, now: CraftAt, part: MovingPart | None, met: Passe
     )
 
 
-def _start(scenario: Scenario, now: CraftAt, plant: Plant, attitude) -> np.ndarray:
-    """At the commanded attitude, at rest, the wheels as the scenario says, the appendages still."""
-    n, m = len(now.wheels), len(plant.mode_damping)
-    x = np.zeros(7 + n + 2 * m + 4)
+def _start(scenario: Scenario, now: CraftAt, plant: Plant, attitude, rate) -> np.ndarray:
+    """At the commanded attitude, at rest or turning along the orbit, the wheels as the scenario says, the appendages still."""
+    n = len(now.wheels)
+    x = np.zeros(_Columns(n, plant, 0).estimation_error.start)
     x[:4] = attitude
+    if scenario.pointings:
+        x[4:7] = rate
     x[7 : 7 + n] = [scenario.wheel_rates.get(w.name, 0.0) for w in now.wheels]
     return x
 
 
 def _errors(scenario: Scenario, loop: Loop, cycles: int, wheels: int) -> Errors:
-    noise, seed = NOISE[scenario.noise], scenario.seed
+    noise, seed = noise_of(scenario), scenario.seed
     estimator = Estimator.giving(noise, loop.period)
     bias = np.asarray(scenario.gyro_bias, float)
     return Errors(
@@ -281,6 +290,7 @@ def _errors(scenario: Scenario, loop: Loop, cycles: int, wheels: int) -> Errors:
         star_tracker_every=max(round(STAR_TRACKER_PERIOD_S / loop.period), 1),
         star_tracker_gain=estimator.gain,
         tachometer=normal(seed, "tachometer", (cycles, wheels), noise.wheel_rad_s),
+        magnetometer=magnetometer_error(scenario, cycles),
     )
 
 
@@ -293,6 +303,7 @@ class _Columns:
     mode: slice
     mode_rate: slice
     ledger: slice
+    source_impulse: slice
     estimation_error: slice
     attitude_error: slice
     rate_estimate: slice
@@ -306,13 +317,15 @@ class _Columns:
     thrust: slice
     impulse: slice
     chill: slice
+    rods: slice
 
     def __init__(self, n: int, plant: Plant, j: int):
         m = len(plant.mode_damping)
-        widths = {"attitude": 4, "rate": 3, "wheel_rate": n, "mode": m, "mode_rate": m, "ledger": 4, "estimation_error": 3,
+        widths = {"attitude": 4, "rate": 3, "wheel_rate": n, "mode": m, "mode_rate": m, "ledger": 4,
+                  "source_impulse": 3 * len(SOURCES) if plant.world.curves.shape[1] else 0, "estimation_error": 3,
                   "attitude_error": 3, "rate_estimate": 3, "controller_rate_error": 3, "control_torque": 3,
                   "motor_torque": n, "drag_estimate": n, "wheel_reading": n, "outside": 3, "on": j, "thrust": j,
-                  "impulse": j, "chill": j}  # fmt: skip
+                  "impulse": j, "chill": j, "rods": 3}  # fmt: skip
         at = 0
         for name, width in widths.items():
             setattr(self, name, slice(at, at + width))
@@ -335,6 +348,8 @@ def _truth(flown: _Flown, scenario: Scenario, part, fired, met) -> Truth:
     if fired is not None:
         torque = torque + fired.leak_N @ fired.arms_m
     attitude = rows[:, columns.attitude]
+    by_source, impulses = _by_source(flown)
+    torque = torque + sum(by_source.values())
     return Truth(
         time_s=times,
         torque_Nm=torque,
@@ -355,12 +370,29 @@ def _truth(flown: _Flown, scenario: Scenario, part, fired, met) -> Truth:
         thrusters=fired,
         cover_angle_rad=None if part is None else part.stowed + angle,
         peaks=tuple(profile_peaks(scenario, met)),
+        torque_by_source_Nm=by_source,
+        impulse_by_source_Nms=impulses,
+        rod_dipole_Am2=rows[:, columns.rods],
+        along=None if flown.along is None else flown.along.at(times),
+        shadows=() if flown.along is None else tuple(flown.along.shadows(times[0], times[-1])),
     )
+
+
+def _by_source(flown: _Flown) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Torque of each source in body axes, and its impulse from the epoch on in inertial axes; those that are not zero throughout."""
+    if flown.along is None:
+        return {}, {}
+    rows, columns, plant = flown.rows, flown.columns, flown.plant
+    attitude, rods = (np.ascontiguousarray(rows[:, c]) for c in (columns.attitude, columns.rods))
+    torque = outside_history(flown.times, attitude, rods, plant.fixed_inertia, plant.world)
+    impulse = (rows - rows[0])[:, columns.source_impulse].reshape(torque.shape)
+    acting = [k for k in range(len(SOURCES)) if np.any(torque[:, k])]
+    return {SOURCES[k]: torque[:, k] for k in acting}, {SOURCES[k]: impulse[:, k] for k in acting}
 
 
 def _readings(flown: _Flown, truth: Truth, now: CraftAt, scenario: Scenario, part) -> dict[str, np.ndarray]:
     """Every channel at every control instant, as the instruments and the flight software give it."""
-    noise, seed = NOISE[scenario.noise], scenario.seed
+    noise, seed = noise_of(scenario), scenario.seed
     wheels = [w.name for w in now.wheels]
     rows, columns = flown.rows, flown.columns
     rate = rows[:, columns.rate_estimate]
@@ -384,6 +416,11 @@ def _readings(flown: _Flown, truth: Truth, now: CraftAt, scenario: Scenario, par
         readings |= thruster_readings(truth.thrusters, scenario, now.craft)
         if scenario.telemetry.accelerometer_count:
             readings |= accelerometer_reading(truth.thrusters, scenario, now.craft, truth.time_s)
+    readings |= axes_of("commanded_rate", flown.commanded_rate, AXES)
+    readings |= axes_of("commanded_quaternion", flown.commanded_attitude, QUATERNION)
+    readings |= motor_readings(scenario, truth, now)
+    if truth.along is not None:
+        readings |= orbital_readings(scenario, truth, truth.along, flown.errors.magnetometer)
     if part is not None and scenario.cover is not None:
         readings |= motor_telemetry(scenario.cover, part, truth.time_s, truth.cover_angle_rad - part.stowed)
     return readings

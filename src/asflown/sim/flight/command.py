@@ -7,9 +7,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...kit.errors import BadInput
+from ...kit.rotations import rotation
+from .pointing import pointed_motion
 
 if TYPE_CHECKING:
-    from ..scenario import Slew
+    from ..scenario import Scenario, Slew
+    from .world import Along
+
+
+def ordered_motion(scenario: Scenario, along: Along | None, times):
+    """What is commanded throughout a flight: slews, upon the pointings where there are any.  As ``commanded_motion``."""
+    q, w, alpha = commanded_motion(scenario.slews, times)
+    if not scenario.pointings:
+        return q, w, alpha
+    carried, rate, acceleration = pointed_motion(scenario.pointings, along, times)
+    back = rotation(q).inv()
+    rate = back.apply(rate)
+    # the rate that carries the craft turns in its axes while it slews
+    return _times(carried, q), w + rate, alpha + back.apply(acceleration) + np.cross(rate, w)
 
 
 def slew_time(slew: Slew) -> float:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-
 import numpy as np
 
-from ...kit.errors import BadInput
-from ...kit.quantities import si_factor
-from ...telemetry.channels import AXES, split_header
+from ...telemetry.channels import AXES
 from ..scenario import Constant, Plume, Scenario, Table, Triangles, axis_number
+from ..tables import read_table
 from .passage import Passed, plume_torque
 
 
@@ -63,7 +60,7 @@ def _corners(source, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     if isinstance(source, Constant):
         return np.zeros(1), np.array([source.torque])
     if isinstance(source, Table) and source.file is not None:
-        return _ended(*_read_table(scenario.folder / source.file))
+        return _ended(*read_table(scenario.folder / source.file, "torque", "N m"))
     if isinstance(source, Triangles):
         times, torques = triangle_corners(source)
     elif isinstance(source, Table):
@@ -81,35 +78,4 @@ def _ended(times, torques) -> tuple[np.ndarray, np.ndarray]:
         times, torques = np.r_[times[0] - 1e-6, times], np.vstack([np.zeros(3), torques])
     if np.any(torques[-1]):
         times, torques = np.r_[times, times[-1] + 1e-6], np.vstack([torques, np.zeros(3)])
-    return times, torques
-
-
-def _read_table(path) -> tuple[np.ndarray, np.ndarray]:
-    remedy = "Write a CSV with the header time [s],x [N m],y [N m],z [N m] (any of the axes) and increasing times."
-    try:
-        with open(path, newline="", encoding="utf-8") as file:
-            rows = [r for r in csv.reader(file) if r and not r[0].lstrip().startswith("#")]
-    except (OSError, UnicodeDecodeError) as why:
-        raise BadInput(f"this torque table cannot be read ({why})", file=path, remedy=remedy) from why
-    split = [split_header(cell) for cell in rows[0]] if rows else []
-    heads = [head for head in split if head is not None]
-    if (
-        len(heads) < 2
-        or len(heads) < len(split)
-        or heads[0][0] != "time"
-        or any(name not in AXES for name, _ in heads[1:])
-    ):
-        raise BadInput("the header of this torque table is not understood", file=path, remedy=remedy)
-    try:
-        values = np.array([[float(cell) for cell in row] for row in rows[1:]])
-    except ValueError as why:
-        raise BadInput(f"a row of this torque table is not all numbers ({why})", file=path, remedy=remedy) from why
-    if values.ndim != 2 or len(values) < 2 or values.shape[1] != len(heads) or not np.isfinite(values).all():
-        raise BadInput("the rows of this torque table do not match its header", file=path, remedy=remedy)
-    times = values[:, 0] * si_factor(heads[0][1], "s")
-    if np.any(np.diff(times) <= 0):
-        raise BadInput("the times of this torque table do not increase", file=path, remedy=remedy)
-    torques = np.zeros((len(times), 3))
-    for column, (name, unit) in enumerate(heads[1:], start=1):
-        torques[:, axis_number(name)] = values[:, column] * si_factor(unit, "N m")
     return times, torques

@@ -68,7 +68,7 @@ def passed(p: Passage, now: CraftAt, start_s: float, stop_s: float) -> Passed:
              "longitude_west_rad": p.longitude_west}  # fmt: skip
     where = replace(where, **{k: v for k, v in given.items() if v is not None})
     air = now.craft.aerodynamics
-    if air is None:
+    if air is None or not air.in_flyby:
         raise BadInput(
             f"the drag of {now.craft.name} is not known, and the gas of a flyby acts by it",
             remedy="Describe it under [aerodynamics] in the craft file.",

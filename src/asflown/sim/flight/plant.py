@@ -15,6 +15,9 @@ leaves a 3 x 3 system for w_dot.
 
 Thrusters push from outside.  Each is a delay and two first-order lags (Feldman & Lee, section V), so its impulse over
 any step is known exactly, and the step gets that impulse as a constant torque.
+
+An orbiting craft also feels the world that it flies through (``World``): its place, the air's flow, the magnetic field and the
+Sun are cubics in time along the orbit, and the torque laws turn them into the body's axes at every stage of a step.
 """
 
 from __future__ import annotations
@@ -25,12 +28,37 @@ import numpy as np
 
 from ...kit.compiled import jit
 
-#: Coulomb drag changes sign over this rate, for a step in it cannot be integrated. [rad/s]
+#: Coulomb drag changes sign over this rate or more (``disturbances.bearing_drag``), for a step in it cannot be integrated. [rad/s]
 DRAG_REVERSAL_RATE = 0.02
 #: Under thruster control a wheel's rate is brought to the one ordered with this gain. Assumed. [1/s]
 WHEEL_RATE_GAIN = 0.5
 #: Stiction has fallen to 1/e of its excess over Coulomb drag at this rate (Stribeck). [rad/s]
 STRIBECK_RATE = 0.5
+
+
+#: What an orbit's torques come from, in the order of the kernel's rows.
+SOURCES = ("gravity_gradient", "sunlight", "dipole", "drag", "rods")
+#: Columns of ``World.curves``, inertial axes: place from the planet's centre [m], velocity [m/s], the same through the air
+#: [m/s], magnetic field [T], unit vector to the Sun, share of its disc that is seen, density of the air [kg/m3].
+PLACE, SPEED, WIND, FIELD, SUN, LIT, AIR = 0, 3, 6, 9, 12, 15, 16
+CURVES = 17
+
+
+class World(NamedTuple):
+    """The surroundings along the orbit, and what of the craft they act on; no curves where a flight has none.
+
+    Facets stand in rows: size, normal (3), centre (3), then for sunlight the shares reflected as by a mirror and diffusely.
+    Size is a sunlit facet's area times the Sun's pressure [N], a facet in the air has area times drag coefficient [m2]."""
+
+    first: float = 0.0  # time of the first knot [s]
+    step: float = 1.0  # from knot to knot [s]
+    curves: np.ndarray = np.empty((4, 0, CURVES))  # cubics between knots, highest power first
+    mu: float = 0.0  # of the planet, 0: no gravity gradient [m3/s2]
+    dipole: np.ndarray = np.zeros(3)  # [A m2]
+    sunlight_lever: np.ndarray = np.zeros(3)  # [N m]
+    sunlit_facets: np.ndarray = np.empty((0, 9))
+    drag_lever: np.ndarray = np.zeros(3)  # per density [N m / (kg/m3)]
+    air_facets: np.ndarray = np.empty((0, 7))
 
 
 class Plant(NamedTuple):
@@ -39,7 +67,7 @@ class Plant(NamedTuple):
     fixed_inertia: np.ndarray  # (3, 3), without the moving part where there is one
     wheel_axes: np.ndarray  # (n, 3)
     spin_inertia: np.ndarray  # (n,)
-    drag: np.ndarray  # (n, 3): viscous, Coulomb, stiction
+    drag: np.ndarray  # (n, 4): viscous, Coulomb, stiction, rate over which the sign changes
     coupling: np.ndarray  # (m, 3), delta
     mode_damping: np.ndarray  # (m,), 2 z W
     mode_stiffness: np.ndarray  # (m,), W^2
@@ -54,6 +82,7 @@ class Plant(NamedTuple):
     motion_angle: np.ndarray  # (5, b), quartics, highest power first
     extra_drag_time: np.ndarray = np.empty(0)  # (s,), drag spikes, linear between, zero at its ends; (0,) without any
     extra_drag: np.ndarray = np.empty((0, 0))  # (s, n), opposing each wheel's rate
+    world: World = World()
 
 
 class Loop(NamedTuple):
@@ -70,7 +99,14 @@ class Loop(NamedTuple):
     filter_d: float
     delay_cycles: int
     gyroscopic_feedforward: bool
-    axes_inverse: np.ndarray  # (n, 3), pseudo-inverse of the wheel axes
+    acceleration_feedforward: bool
+    tracking: bool  # the rate's error is against the commanded rate, else against none
+    turning: np.ndarray  # (N,), which of the sets of wheels below turns the craft in each cycle
+    axes_inverse: np.ndarray  # (p, n, 3), pseudo-inverse of a set's axes, zero rows for wheels not in it
+    from_outside: np.ndarray  # (p,) bool, what a coasting wheel would have given comes from outside
+    null_space: np.ndarray  # (p, n, n), projector on torques that cancel on the body, times their gain [1/s]
+    null_rate: np.ndarray  # (n,), to which wheels are brought in the null space [rad/s]
+    null_limit: float  # largest torque of a wheel for it [N m]
     torque_limit: np.ndarray  # (n,)
     rate_limit: np.ndarray  # (n,)
     friction_kp: float  # [1/s], 0: no compensation
@@ -86,6 +122,19 @@ class Errors(NamedTuple):
     star_tracker_every: int  # cycles
     star_tracker_gain: float
     tachometer: np.ndarray  # (N, n)
+    magnetometer: np.ndarray = np.empty((0, 3))  # (N, 3), bias included; no rows without an orbit [T]
+
+
+class Rods(NamedTuple):
+    """Torque rods and the law by which they unload the wheels; no rows where a flight has none."""
+
+    axes: np.ndarray = np.empty((0, 3))  # (r, 3)
+    axes_inverse: np.ndarray = np.empty((0, 3))  # (r, 3)
+    limit: np.ndarray = np.empty(0)  # (r,) [A m2]
+    gain: float = 0.0  # [1/s]
+    target: np.ndarray = np.zeros(3)  # stored momentum to be kept, body axes [N m s]
+    every: int = 1  # cycles from one order to the next
+    acting: int = 1  # of these, in which the rods are on
 
 
 class Thrusters(NamedTuple):
@@ -135,12 +184,105 @@ def _solve3(m, b, out):
 
 
 @jit
-def drag_torque(rate, viscous, coulomb, stiction):
+def drag_torque(rate, viscous, coulomb, stiction, reversal):
     """Bearing drag opposing the rate: viscous, Coulomb, and stiction that fades (Stribeck). [N m]
 
-    The sign change at rest is a tanh over DRAG_REVERSAL_RATE: a wheel 'sticks' as a slow creep."""
+    The sign change at rest is a tanh over ``reversal``: a wheel 'sticks' as a slow creep."""
     excess = (stiction - coulomb) * np.exp(-((rate / STRIBECK_RATE) ** 2)) if stiction > coulomb else 0.0
-    return viscous * rate + (coulomb + excess) * np.tanh(rate / DRAG_REVERSAL_RATE)
+    return viscous * rate + (coulomb + excess) * np.tanh(rate / reversal)
+
+
+@jit
+def world_at(t, world, out):
+    """Row of the curves at an instant; the first and last cubic hold beyond the ends."""
+    x = (t - world.first) / world.step
+    k = min(max(int(np.floor(x)), 0), world.curves.shape[1] - 1)
+    u = (x - k) * world.step
+    c = world.curves
+    for i in range(len(out)):
+        out[i] = ((c[0, k, i] * u + c[1, k, i]) * u + c[2, k, i]) * u + c[3, k, i]
+
+
+@jit
+def _to_body(q, v, out):
+    """An inertial vector in body axes: R(q)^T v."""
+    a, b, c, d = q[0], q[1], q[2], q[3]
+    x, y, z = v[0], v[1], v[2]
+    out[0] = (a * a + b * b - c * c - d * d) * x + 2 * (b * c + a * d) * y + 2 * (b * d - a * c) * z
+    out[1] = 2 * (b * c - a * d) * x + (a * a - b * b + c * c - d * d) * y + 2 * (c * d + a * b) * z
+    out[2] = 2 * (b * d + a * c) * x + 2 * (c * d - a * b) * y + (a * a - b * b - c * c + d * d) * z
+
+
+@jit
+def _to_inertial(q, v, out):
+    """A body vector in inertial axes: R(q) v."""
+    a, b, c, d = q[0], q[1], q[2], q[3]
+    x, y, z = v[0], v[1], v[2]
+    out[0] = (a * a + b * b - c * c - d * d) * x + 2 * (b * c - a * d) * y + 2 * (b * d + a * c) * z
+    out[1] = 2 * (b * c + a * d) * x + (a * a - b * b + c * c - d * d) * y + 2 * (c * d - a * b) * z
+    out[2] = 2 * (b * d - a * c) * x + 2 * (c * d + a * b) * y + (a * a - b * b - c * c + d * d) * z
+
+
+@jit
+def outside_torques(t, q, inertia, rods, world, out):
+    """Torque on the body from each of SOURCES, body axes.  (5, 3) [N m]   ``rods``: their dipole (3,) [A m2]
+
+    gravity gradient  3 mu / r^5  r x (I r)                    sunlight  lit x (lever x s), or of facets
+    dipole, rods      m x B                                    drag      density x (lever x -v/|v|), or of facets
+
+    A sunlit facet feels -P A cos [(1 - mirror) s + 2 (mirror cos + diffuse / 3) n] where cos = n.s > 0 (Wertz 1978, eq 17-27),
+    one in the air -1/2 rho v^2 C A cos v/|v| where cos = n.v/|v| > 0 (eq 17-57).  No facet shades another."""
+    row, r, v, B, s = np.empty(CURVES), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    moment, force, lever = np.empty(3), np.empty(3), np.empty(3)
+    world_at(t, world, row)
+    _to_body(q, row[PLACE : PLACE + 3], r)
+    _to_body(q, row[WIND : WIND + 3], v)
+    _to_body(q, row[FIELD : FIELD + 3], B)
+    _to_body(q, row[SUN : SUN + 3], s)
+    for i in range(3):
+        moment[i] = inertia[i, 0] * r[0] + inertia[i, 1] * r[1] + inertia[i, 2] * r[2]
+    distance2 = r[0] ** 2 + r[1] ** 2 + r[2] ** 2
+    speed = np.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)
+    pull = 3 * world.mu / (distance2 * distance2 * np.sqrt(distance2))
+    _cross(r, moment, out[0])
+    _cross(world.sunlight_lever, s, out[1])
+    _cross(world.dipole, B, out[2])
+    _cross(world.drag_lever, v, out[3])
+    _cross(rods, B, out[4])
+    for i in range(3):
+        out[0, i] *= pull
+        out[1, i] *= row[LIT]
+        out[3, i] *= -row[AIR] / speed if speed > 0.0 else 0.0
+    for k in range(len(world.sunlit_facets)):
+        f = world.sunlit_facets[k]
+        cosine = f[1] * s[0] + f[2] * s[1] + f[3] * s[2]
+        if cosine <= 0.0:
+            continue
+        for i in range(3):
+            along = (1 - f[7]) * s[i] + 2 * (f[7] * cosine + f[8] / 3) * f[1 + i]
+            force[i] = -row[LIT] * f[0] * cosine * along
+            lever[i] = f[4 + i]
+        _cross(lever, force, moment)
+        out[1] += moment
+    for k in range(len(world.air_facets)):
+        f = world.air_facets[k]
+        cosine = (f[1] * v[0] + f[2] * v[1] + f[3] * v[2]) / speed if speed > 0.0 else 0.0
+        if cosine <= 0.0:
+            continue
+        for i in range(3):
+            force[i] = -0.5 * row[AIR] * speed * f[0] * cosine * v[i]
+            lever[i] = f[4 + i]
+        _cross(lever, force, moment)
+        out[3] += moment
+
+
+@jit
+def outside_history(times, attitudes, rods, inertia, world):
+    """Torques of all SOURCES at instants, body axes (N, 5, 3) [N m]; ``rods`` (N, 3) [A m2], ``inertia`` (3, 3)."""
+    out = np.empty((len(times), len(SOURCES), 3))
+    for i in range(len(times)):
+        outside_torques(times[i], attitudes[i], inertia, rods[i], world, out[i])
+    return out
 
 
 @jit
@@ -221,9 +363,10 @@ def moving_part_history(times, rates, plant):
 
 
 @jit
-def _derivative(t, x, motor, outside, plant, dx):
+def _derivative(t, x, motor, outside, rods, plant, dx):
     """State: q (4), w (3), rho (n), eta (m), eta_dot (m), then the energy ledger of four: work by the
-    external torque, work by the motors, loss in the bearings, loss in the modes. [J]"""
+    external torque, work by the motors, loss in the bearings, loss in the modes [J]; in an orbit then the impulse of each of
+    SOURCES in inertial axes (15) [N m s]."""
     n, m = len(plant.spin_inertia), len(plant.mode_damping)
     w, rho = x[4:7], x[7 : 7 + n]
     eta, eta_dot = x[7 + n : 7 + n + m], x[7 + n + m : 7 + n + 2 * m]
@@ -250,6 +393,14 @@ def _derivative(t, x, motor, outside, plant, dx):
             right[i] -= h_rel_dot[i] + slope[i, 0] * w[0] + slope[i, 1] * w[1] + slope[i, 2] * w[2]
     for i in range(3):
         H[i] += mass[i, 0] * w[0] + mass[i, 1] * w[1] + mass[i, 2] * w[2]
+    if plant.world.curves.shape[1] > 0:
+        felt = np.empty((len(SOURCES), 3))
+        outside_torques(t, x[:4], mass, rods, plant.world, felt)
+        for k in range(len(SOURCES)):
+            _to_inertial(x[:4], felt[k], ledger[4 + 3 * k : 7 + 3 * k])
+            for i in range(3):
+                right[i] += felt[k, i]
+                ledger[0] += felt[k, i] * w[i]
 
     ledger[1] = 0.0
     ledger[2] = 0.0
@@ -260,9 +411,9 @@ def _derivative(t, x, motor, outside, plant, dx):
         table_at(t, plant.extra_drag_time, plant.extra_drag, extra)
     for k in range(n):
         J, a = plant.spin_inertia[k], plant.wheel_axes[k]
-        drag = drag_torque(rho[k], plant.drag[k, 0], plant.drag[k, 1], plant.drag[k, 2])
+        drag = drag_torque(rho[k], plant.drag[k, 0], plant.drag[k, 1], plant.drag[k, 2], plant.drag[k, 3])
         if spikes:
-            drag += extra[k] * np.tanh(rho[k] / DRAG_REVERSAL_RATE)
+            drag += extra[k] * np.tanh(rho[k] / plant.drag[k, 3])
         dx[7 + k] = (motor[k] - drag) / J
         ledger[1] += motor[k] * rho[k]
         ledger[2] += drag * rho[k]
@@ -297,19 +448,19 @@ def _derivative(t, x, motor, outside, plant, dx):
 
 
 @jit
-def advance(t, x, motor, outside, plant, step, steps, work):
-    """``steps`` Runge-Kutta steps of fourth order, the motor torques (n,) and a torque on the body from ``outside``
-    (3,) held; ``work`` is (5, len(x))."""
+def advance(t, x, motor, outside, rods, plant, step, steps, work):
+    """``steps`` Runge-Kutta steps of fourth order, the motor torques (n,), a torque on the body from ``outside`` (3,) and the
+    dipole of the ``rods`` (3,) held; ``work`` is (5, len(x))."""
     k1, k2, k3, k4, y = work[0], work[1], work[2], work[3], work[4]
     for s in range(steps):
         ts = t + s * step
-        _derivative(ts, x, motor, outside, plant, k1)
+        _derivative(ts, x, motor, outside, rods, plant, k1)
         y[:] = x + 0.5 * step * k1
-        _derivative(ts + 0.5 * step, y, motor, outside, plant, k2)
+        _derivative(ts + 0.5 * step, y, motor, outside, rods, plant, k2)
         y[:] = x + 0.5 * step * k2
-        _derivative(ts + 0.5 * step, y, motor, outside, plant, k3)
+        _derivative(ts + 0.5 * step, y, motor, outside, rods, plant, k3)
         y[:] = x + step * k3
-        _derivative(ts + step, y, motor, outside, plant, k4)
+        _derivative(ts + step, y, motor, outside, rods, plant, k4)
         x += step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         # rounding and truncation only (below 1e-12 a step): momentum does not depend on it
         x[:4] /= np.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2 + x[3] ** 2)
@@ -367,6 +518,40 @@ def impulses(thrusters, cycle, on, was_on, level, chill, thrust, start, stop, ou
 
 
 @jit
+def _order_rods(rods, field, stored, dipole):
+    """Dipole (3,) that takes away stored momentum: m = k (h - target) x B / B^2 (Markley and Crassidis 2014, section 7.5).
+
+    m x B = -k (h - target) across the field.  All rods are weakened alike where one would exceed its limit."""
+    excess, wanted = np.empty(3), np.empty(3)
+    size2 = field[0] ** 2 + field[1] ** 2 + field[2] ** 2
+    for i in range(3):
+        excess[i] = stored[i] - rods.target[i]
+    _cross(excess, field, wanted)
+    strength, most = np.zeros(len(rods.limit)), 1.0
+    for k in range(len(strength)):
+        for i in range(3):
+            strength[k] += rods.axes_inverse[k, i] * rods.gain * wanted[i] / size2
+        most = max(most, abs(strength[k]) / rods.limit[k])
+    dipole[:] = 0.0
+    for k in range(len(strength)):
+        for i in range(3):
+            dipole[i] += rods.axes[k, i] * strength[k] / most
+
+
+@jit
+def _null_space_torque(loop, set_of_wheels, rates, spin_inertia, out):
+    """Motor torques (n,) that bring the wheels to their rates and cancel on the body, none beyond the limit. [N m]"""
+    most = 0.0
+    for k in range(len(out)):
+        out[k] = 0.0
+        for j in range(len(out)):
+            out[k] += loop.null_space[set_of_wheels, k, j] * spin_inertia[j] * (loop.null_rate[j] - rates[j])
+        most = max(most, abs(out[k]))
+    if most > loop.null_limit:
+        out *= loop.null_limit / most
+
+
+@jit
 def _order_pulses(thrusters, e, rate_error, burn, push, on):
     """Which thrusters fire for a cycle: outside the deadband those that push back, in a burn all that may.
 
@@ -384,14 +569,15 @@ def _order_pulses(thrusters, e, rate_error, burn, push, on):
 
 
 @jit
-def fly_cycles(plant, loop, errors, thrusters, coasting, q_c, w_c, alpha_c, first_time, x, record):
+def fly_cycles(plant, loop, errors, thrusters, rods, coasting, q_c, w_c, alpha_c, first_time, x, record):
     """Control cycles from ``first_time`` on, one row of ``record`` each, before its torque acts.
 
     Row: state, then estimation error (3), attitude error (3), estimated rate (3), controller rate
     error (3), commanded torque on the body (3), motor torques (n), drag estimates (n), measured wheel
-    rates (n), torque from outside in place of coasting wheels (3), and of each thruster whether it is on, thrust,
-    impulse so far, leaks included, and how cold its bed is (j each).  Where ``coasting``, (N, n) bool, a wheel's motor is off,
-    and what it would have given the body comes from outside, exactly and at once.  A wheel at its rate limit ends the flight
+    rates (n), torque from outside in place of coasting wheels (3), of each thruster whether it is on, thrust,
+    impulse so far, leaks included, and how cold its bed is (j each), and the rods' dipole (3).  Where ``coasting``, (N, n) bool,
+    a wheel's motor is off: the others turn the craft where they can, else what it would have given the body comes from outside,
+    exactly and at once.  A wheel at its rate limit ends the flight
     where the wheels hold the attitude; under thruster control its motor takes it no further.  Returns the rows written and the
     wheel that ended the flight (-1: none)."""
     n, size = len(plant.spin_inertia), len(x)
@@ -414,6 +600,7 @@ def fly_cycles(plant, loop, errors, thrusters, coasting, q_c, w_c, alpha_c, firs
     push, rate_error, total = np.zeros(3), np.zeros(3), np.zeros(3)
     burn, next_burn, burnt = -1, 0, 0.0
     spin = x[7 : 7 + n].copy()  # wheel rates ordered
+    dipole, row_of_world, field, balancing = np.zeros(3), np.empty(CURVES), np.empty(3), np.zeros(n)
 
     for cycle in range(cycles):
         held = fired > 0 and thrusters.in_control[cycle]
@@ -435,7 +622,7 @@ def fly_cycles(plant, loop, errors, thrusters, coasting, q_c, w_c, alpha_c, firs
                 s[1] = loop.filter_a[1, 0] * s[0] + loop.filter_a[1, 1] * s[1] + loop.filter_b[1] * signal
                 s[0] = s0
                 signal = out
-            c[i] = w_c[cycle, i] + loop.kp * e[i] - signal
+            c[i] = (w_c[cycle, i] if loop.tracking else 0.0) + loop.kp * e[i] - signal
         h[:] = 0.0
         for k in range(n):
             for i in range(3):
@@ -445,17 +632,29 @@ def fly_cycles(plant, loop, errors, thrusters, coasting, q_c, w_c, alpha_c, firs
             torque[i] = loop.inertia[i, i] * loop.kd * c[i]
             for j in range(3):
                 believed[i] += loop.inertia[i, j] * w_c[cycle, j]
-                torque[i] += loop.inertia[i, j] * alpha_c[cycle, j]
+                if loop.acceleration_feedforward:
+                    torque[i] += loop.inertia[i, j] * alpha_c[cycle, j]
         if loop.gyroscopic_feedforward:
             _cross(w_c[cycle], believed, feed)
             torque += feed
         if held:
             torque[:] = 0.0
+        turning = loop.turning[cycle]
+        if loop.null_limit > 0.0:
+            _null_space_torque(loop, turning, measured, plant.spin_inertia, balancing)
+        if len(rods.limit) > 0:
+            if cycle % rods.every == 0:
+                world_at(t, plant.world, row_of_world)
+                _to_body(x[:4], row_of_world[FIELD : FIELD + 3], field)
+                field += errors.magnetometer[cycle]
+                _order_rods(rods, field, h, dipole)
+            elif cycle % rods.every >= rods.acting:
+                dipole[:] = 0.0
 
         for k in range(n):
-            wanted = 0.0
+            wanted = balancing[k]
             for i in range(3):
-                wanted -= loop.axes_inverse[k, i] * torque[i]
+                wanted -= loop.axes_inverse[turning, k, i] * torque[i]
             if loop.friction_kp > 0.0:
                 # what the commands explain of the wheel's momentum, against what its rate says
                 lag = expected[k] - plant.spin_inertia[k] * measured[k]
@@ -469,8 +668,9 @@ def fly_cycles(plant, loop, errors, thrusters, coasting, q_c, w_c, alpha_c, firs
             if coasting[cycle, k]:
                 motor[k] = 0.0
                 spin[k] = measured[k]
-                for i in range(3):
-                    outside[i] -= ordered[k] * plant.wheel_axes[k, i]
+                if loop.from_outside[turning]:
+                    for i in range(3):
+                        outside[i] -= ordered[k] * plant.wheel_axes[k, i]
                 continue
             if not held:
                 spin[k] = measured[k]  # where thrusters take over the wheels stay at the rates they have
@@ -516,12 +716,13 @@ def fly_cycles(plant, loop, errors, thrusters, coasting, q_c, w_c, alpha_c, firs
         row[size + 18 + 3 * n : size + 18 + 3 * n + fired] = on
         row[size + 18 + 3 * n + fired : size + 18 + 3 * n + 2 * fired] = thrust
         row[size + 18 + 3 * n + 2 * fired : size + 18 + 3 * n + 3 * fired] = impulse
-        row[size + 18 + 3 * n + 3 * fired :] = chill
+        row[size + 18 + 3 * n + 3 * fired : size + 18 + 3 * n + 4 * fired] = chill
+        row[size + 18 + 3 * n + 4 * fired :] = dipole
         for k in range(n):
             if not held and abs(x[7 + k]) >= loop.rate_limit[k]:
                 return cycle + 1, k
         if fired == 0:
-            advance(t, x, motor, outside, plant, step, loop.substeps, work)
+            advance(t, x, motor, outside, dipole, plant, step, loop.substeps, work)
         else:
             for s in range(loop.substeps):
                 impulses(thrusters, cycle, on, was_on, level, chill, thrust, s * step, (s + 1) * step, given)
@@ -530,7 +731,7 @@ def fly_cycles(plant, loop, errors, thrusters, coasting, q_c, w_c, alpha_c, firs
                     impulse[k] += given[k]
                     for i in range(3):
                         total[i] += thrusters.arms[k, i] * given[k] / step
-                advance(t + s * step, x, motor, total, plant, step, 1, work)
+                advance(t + s * step, x, motor, total, dipole, plant, step, 1, work)
             for k in range(fired):
                 was_on[k] = on[k]
                 if on[k]:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from ..scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -29,7 +33,19 @@ class Noise:
 
 
 _NOMINAL = Noise(5e-6, 8e-6, 15.0, 2e-6, 0.005)
-NOISE = {"none": _NOMINAL.scaled(0.0), "half": _NOMINAL.scaled(0.5), "nominal": _NOMINAL, "double": _NOMINAL.scaled(2)}
+FACTOR = {"none": 0.0, "half": 0.5, "nominal": 1.0, "double": 2.0}
+NOISE = {name: _NOMINAL.scaled(factor) for name, factor in FACTOR.items()}
+
+
+def noise_of(scenario: Scenario) -> Noise:
+    """The house's own levels, but for those that the scenario's [sensors] give, times what its noise says."""
+    s = scenario.sensors
+    own = {
+        "attitude_white_rad": s.attitude_white, "attitude_coloured_rad": s.attitude_coloured,
+        "attitude_time_s": s.attitude_time, "gyro_rad_s": s.gyro, "wheel_rad_s": s.wheel_rate,
+    }  # fmt: skip
+    return replace(_NOMINAL, **{k: v for k, v in own.items() if v is not None}).scaled(FACTOR[scenario.noise])
+
 
 STAR_TRACKER_PERIOD_S = 1.0
 

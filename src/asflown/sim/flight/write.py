@@ -13,6 +13,8 @@ from ...kit.files import write_text
 from ...kit.timeline import utc_label
 from ...telemetry.channels import AXES
 from ...telemetry.tables import write_table
+from .faults import true_drag
+from .world import acting_dipole, acting_drag, acting_sunlight, reference_density
 
 
 def write_flight(flight, directory: str | Path) -> dict[str, Path]:
@@ -51,6 +53,13 @@ def truth_table(flight) -> str:
         add("linear_impulse_inertial", "N s", truth.thrusters.linear_impulse_Ns(truth.attitude), AXES)
     if truth.density_kgm3 is not None:
         columns |= {"density [kg/m3]": truth.density_kgm3, "altitude [m]": truth.altitude_m}
+    for name, torque in truth.torque_by_source_Nm.items():
+        add(f"{name}_torque", "N m", torque, AXES)
+    if truth.along is not None:
+        columns |= {"sunlit []": truth.along.lit, "air_density [kg/m3]": truth.along.density_kgm3}
+        add("orbit_position", "m", truth.along.position_N, AXES)
+    if "rods" in truth.torque_by_source_Nm:
+        add("torque_rod_dipole", "A m2", truth.rod_dipole_Am2, AXES)
     if truth.cover_angle_rad is not None:
         columns["cover_angle [rad]"] = truth.cover_angle_rad
     head = [
@@ -75,6 +84,7 @@ def truth_record(flight) -> dict:
         "noise": scenario.noise,
         "ended": flight.ended,
         "inertia_kg_m2": np.asarray(flight.inertia_kgm2).tolist(),
+        "environment": _environment_of(flight),
         "controller_inertia_kg_m2": None if scenario.controller.inertia is None else list(scenario.controller.inertia),
         "wheels": list(flight.wheels),
         "torque_profile": [source.model_dump() for source in scenario.torques],
@@ -114,7 +124,28 @@ def _thrusters_of(flight) -> dict:
 def _drag_of(flight) -> dict:
     """Bearing drag of every wheel as flown; nothing where friction was off."""
     wheels = flight.craft.at(flight.scenario.epoch_ns).wheels if flight.scenario.friction else ()
+    drags = {w.name: true_drag(flight.scenario, w) for w in wheels}
     return {
-        w.name: {"viscous_Nms": w.drag.viscous, "coulomb_Nm": w.drag.coulomb, "stiction_Nm": w.drag.stiction}
-        for w in wheels
+        name: {"viscous_Nms": drag.viscous, "coulomb_Nm": drag.coulomb, "stiction_Nm": drag.stiction}
+        for name, drag in drags.items()
     }
+
+
+def _environment_of(flight) -> dict | None:
+    """What really acted along the orbit, for the truth beside the telemetry; None without an orbit, null for what did not act."""
+    truth, e = flight.truth, flight.scenario.environment
+    if truth.along is None:
+        return None
+    record: dict = {"sources": list(truth.torque_by_source_Nm), "shadows": list(truth.shadows)}
+    if e is None:
+        return record
+    now = flight.craft.at(flight.scenario.epoch_ns)
+    (sun, lit), (air, flown_through) = acting_sunlight(e, now), acting_drag(e, now)
+    vectors = {"dipole_Am2": acting_dipole(e, now), "sunlight_lever_Nm": sun, "drag_lever_Nm": air}
+    return record | {name: None if v is None else v.tolist() for name, v in vectors.items()} | {
+        "sunlit_facets": len(lit), "air_facets": len(flown_through),
+        "reference_density_kgm3": reference_density(e, now), "density_factor": e.density_factor,
+        "density_swing": e.density_swing, "density_phase_rad": e.density_phase,
+        "meaning": "torque = gravity gradient + lit (sunlight_lever x s) + dipole x B + density / reference_density (drag_lever x -v/|v|)"
+        " + rods x B, body axes, s and v/|v| of length one; sunlit, air_density and each source's torque stand in truth.csv",
+    }  # fmt: skip

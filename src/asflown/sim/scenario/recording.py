@@ -29,6 +29,15 @@ class Sampling(Part):
     controller_rate_error: Second = 0.0
     quaternion: Second = 4.0
     control_torque: Second = 0.0
+    wheel_torque: Second = 0.0
+    wheel_current: Second = 0.0  # where the craft's file gives every motor's torque_constant
+    commanded_rate: Second = 0.0
+    commanded_quaternion: Second = 0.0
+    orbit_position: Second = 0.0  # this and the next four of a flight in an orbit
+    orbit_velocity: Second = 0.0
+    magnetic_field: Second = 0.0
+    sun_direction: Second = 0.0
+    torque_rod_dipole: Second = 0.0
     wheel_momentum: Second = 0.0
     on_time: Second = 16.0  # thrusters' counters, only where the flight has any
     pulse_count: Second = 0.0

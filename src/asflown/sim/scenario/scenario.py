@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, model_validator
 
-from ...craft.model import Kilogram, Second, _in
+from ...craft.model import Drag, InertiaElements, Kilogram, Second, _in
 from ...kit.errors import BadInput
 from ...kit.timeline import utc_to_tai_ns
 from ..plans import Plan, shipped
 from .control import Controller
 from .motion import CoverMotion, Slew
+from .orbiting import Environment, OrbitFlown, Pointing, Sensors, Unloading
 from .recording import Sampling
 from .thrusters import BranchSwap, Burn, ThrusterControl, ThrusterFault, ThrusterUse
 from .torques import AnyTorque, Passage
 from .units import RateVector, _by_name
-from .wheels import Coast, DragSpike, WheelBias
+from .wheels import Coast, DragGrowth, DragSpike, WheelBias
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -48,12 +49,20 @@ class Scenario(Plan):
     friction: bool = False
     gyro_bias: RateVector = (0.0, 0.0, 0.0)  # what calibration left over
     accelerometer_bias: _in("m/s2") = 0.0  # type: ignore[valid-type]
+    inertia: InertiaElements | None = None  # the true one, in place of the craft file's
+    orbit: OrbitFlown | None = None
+    environment: Environment | None = None
+    pointings: tuple[Pointing, ...] = ()
+    unloading: Unloading | None = None
+    sensors: Sensors = Sensors()
     wheel_rates: _by_name("rad/s") = Field(default_factory=dict)  # type: ignore[valid-type]
     torques: tuple[AnyTorque, ...] = ()
     flyby: Passage | None = None
     slews: tuple[Slew, ...] = ()
     coasts: tuple[Coast, ...] = ()
     drag_spikes: tuple[DragSpike, ...] = ()
+    drag_growth: tuple[DragGrowth, ...] = ()
+    wheel_drag: dict[str, Drag] = Field(default_factory=dict)  # the true one, in place of the craft file's
     thrusters: ThrusterUse | None = None
     thruster_control: tuple[ThrusterControl, ...] = ()
     branch_swaps: tuple[BranchSwap, ...] = ()
@@ -100,7 +109,7 @@ class Scenario(Plan):
     def _flown_in_order(self):
         if self.flyby and self.flyby.gravity_gradient and self.slews:
             raise ValueError("a flyby with gravity_gradient is flown at one attitude: no slews")
-        for name in ("branch_swaps", "burns"):
+        for name in ("branch_swaps", "burns", "pointings"):
             if any(b.start < a.start for a, b in pairwise(getattr(self, name))):
                 raise ValueError(f"{name}: in order of their start")
         return self

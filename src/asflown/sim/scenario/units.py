@@ -36,3 +36,4 @@ TorqueVector, RateVector, AngleVector = _in("N m", 3), _in("rad/s", 3), _in("rad
 
 
 RadianPerSecond2, KilometrePerSecond, Kelvin = _in("rad/s2"), _in("m/s"), _in("K")
+Share = Annotated[float, BeforeValidator(lambda value: quantity(value, ""))]

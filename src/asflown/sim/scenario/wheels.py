@@ -6,15 +6,15 @@ from typing import ClassVar
 
 from pydantic import Field, model_validator
 
-from ...craft.model import NewtonMetre, Second
+from ...craft.model import Date, NewtonMetre, Second
 from ..plans import Part
-from .units import _by_name
+from .units import Share, _by_name
 
 
 class Coast(Part):
     """A wheel left to its bearing: the motor is off.
 
-    Where the wheels hold the attitude an ideal torque from outside does this one's part of it."""
+    The other wheels hold the attitude where they span three axes; else an ideal torque from outside does this one's part."""
 
     wheel: str
     start: Second
@@ -52,3 +52,12 @@ class WheelBias(Part):
         if self.stop <= self.start:
             raise ValueError("a wheel bias stops after it starts")
         return self
+
+
+class DragGrowth(Part):
+    """Bearing drag that has grown by the scenario's epoch: linear in time from a date on, a share of the craft's own a day."""
+
+    wheel: str
+    since: Date
+    coulomb_per_day: Share = 0.0
+    viscous_per_day: Share = 0.0
