@@ -116,14 +116,22 @@ def inertia(
     subject = subject_of(telemetry, craft, moving=None)
     if not telemetry.members("wheel_rate") and telemetry.has_axes("control_torque"):
         answer = by_torque(subject)
+    elif method == "consistent":
+        answer = whole_motion_of(subject, frame, progress)
     else:
-        record = slew_record(subject)
-        record = conserved(record, _slews(record), telemetry.source or None)
-        if method == "consistent":
-            answer = by_whole_motion(subject, record, _excited(record), frame, progress)
-        else:
-            answer = _by_samples(subject, record, method, frame)
+        answer = _by_samples(subject, _conserved(subject), method, frame)
     return _result(subject, answer, wheel_scale, rate_scale)
+
+
+def whole_motion_of(subject: Subject, frame: str = "body", progress: Callable[[str], None] | None = None) -> Answer:
+    """The answer of method 'consistent'.  Raises BadInput as ``inertia`` does."""
+    record = _conserved(subject)
+    return by_whole_motion(subject, record, _excited(record), frame, progress)
+
+
+def _conserved(subject: Subject) -> SlewRecord:
+    record = slew_record(subject)
+    return conserved(record, _slews(record), subject.telemetry.source or None)
 
 
 def _motion_of(record: SlewRecord) -> tuple[np.ndarray, np.ndarray]:
