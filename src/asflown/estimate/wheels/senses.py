@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 #: Blocks in which rates are averaged, at most, and samples of the coarsest channel in each at least; fewest blocks that tell.
 _BLOCKS, _SAMPLES, _FEWEST = 300, 3, 30
+#: Instants in a block at which channels are read.
+_INSTANTS = 12
 #: Wheels that are tried in all combinations.
 _MOST = 8
 #: Share of the body's own change that the best choice may leave (variances), how much more the file's must leave, and any other.
@@ -72,13 +74,14 @@ def _in_blocks(record: RecordedWheels, names: list[str]) -> tuple[np.ndarray | N
     count = int((stop - start) / length)
     if count < _FEWEST:
         return None, 0.0
-    means = np.full((count, len(used)), np.nan)
-    for k, (t, c) in enumerate(zip(times, used, strict=True)):
-        block = np.floor((t - start) / length).astype(int)
-        inside = (block >= 0) & (block < count)
-        total = np.bincount(block[inside], c.values[inside], count)
-        number = np.bincount(block[inside], minlength=count)
-        means[number > 0, k] = total[number > 0] / number[number > 0]
+    # all at the same instants: means over samples of different cadence would be of different times
+    at = start + length * (np.arange(_INSTANTS * count) + 0.5) / _INSTANTS
+    means = np.column_stack([
+        np.interp(at, t, c.values).reshape(count, _INSTANTS).mean(axis=1) for t, c in zip(times, used, strict=True)
+    ])  # fmt: skip
+    for k, t in enumerate(times):
+        seen = np.bincount(np.clip(((t - start) / length).astype(int), 0, count - 1), minlength=count)
+        means[seen == 0, k] = np.nan
     return means, length
 
 
