@@ -10,7 +10,8 @@ import pytest
 
 from asflown.kit.timeline import gps_to_tai_ns, utc_label, utc_to_tai_ns
 from asflown.telemetry.load import load_telemetry
-from asflown.telemetry.tables import read_csv, write_table
+from asflown.telemetry.text import read_csv
+from asflown.telemetry.write import write_table
 from cli.program import T, csv_text, flight, run
 from flights import flown, saved, written
 

@@ -49,6 +49,15 @@ def parse_unit(text: str):
         ) from why
 
 
+def is_unit(text: str) -> bool:
+    """Whether ``text`` names a unit."""
+    try:
+        parse_unit(text)
+    except BadInput:
+        return False
+    return True
+
+
 @cache
 def si_factor(text: str, expected: str) -> float:
     """Factor from the unit ``text`` to SI, checked to be of the kind ``expected`` (an SI unit).

@@ -50,6 +50,11 @@ def utc_to_tai_ns(stamps) -> Any:
     return int(ns[0]) if one else ns
 
 
+def utc_to_posix_ns(stamp: str) -> int:
+    """A UTC label as nanoseconds since 1970 that skip leap seconds."""
+    return _posix_ns(stamp)[0]
+
+
 def _posix_ns(stamp) -> tuple[int, bool]:
     """A UTC label as nanoseconds since 1970 that skip leap seconds, and whether it lies within a leap second."""
     text = str(stamp).strip()

@@ -97,6 +97,13 @@ def member_of(name: str) -> str:
     return name.removeprefix(kind_of(name).stem).removeprefix("_")
 
 
+def member_names(stem: str, count: int) -> tuple[str, ...]:
+    """Members of a family given as one array of ``count`` columns: its axes or components, else numbers from 1."""
+    kind = next((k for k in KINDS if k.stem == stem), None)
+    known = _MEMBERS.get(kind.member, ()) if kind else ()
+    return known if len(known) == count else tuple(str(k) for k in range(1, count + 1))
+
+
 def example_names() -> list[str]:
     """Every name, with <NAME> where a wheel, thruster or mechanism stands."""
     names = []

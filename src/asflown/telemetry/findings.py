@@ -16,7 +16,7 @@ class Finding:
     """One kind of fault found in a channel ('' for the whole file): how often, and where first."""
 
     channel: str
-    what: str  # duplicate, conflict, disorder, repeat, spike, stuck, still, wrap, fall, norm, nan, gap, dropout, orbit, ignored, excluded
+    what: str  # duplicate, conflict, disorder, repeat, spike, stuck, still, wrap, fall, norm, nan, gap, dropout, orbit, ignored, excluded, fill, declared, stray, form
     count: int
     first_tai_ns: int
     detail: str
@@ -49,7 +49,7 @@ RATE_SCALE = Kind(
 )  # fmt: skip
 
 #: Finding -> its doubt.  Findings not listed here do no harm: samples that are missing (gap, dropout),
-#: excluded by the user (excluded), or not requested (ignored).
+#: excluded by the user (excluded) or not requested (ignored), declared fill values (declared), how the file was read (form).
 OF_FINDING = {
     "duplicate": Kind("telemetry.duplicates", Severity.NOTE,
                       "{count} time stamps occur twice with the same values{where}; the first sample is used", _CHECK),
@@ -58,6 +58,11 @@ OF_FINDING = {
     "disorder": Kind("telemetry.disorder", Severity.CAUTION, "{count} late samples{where} were sorted by time", _CHECK),
     "repeat": Kind("telemetry.repeats", Severity.CAUTION,
                    "{count} samples repeat the previous value bit for bit{where}: stale frames", _CHECK),
+    "fill": Kind("telemetry.fill", Severity.CAUTION,
+                 "{count} samples hold fill values or come from unfilled packets{where}; they were left out",
+                 "Declare fill values in a channel dictionary (fill = [...])."),
+    "stray": Kind("telemetry.strays", Severity.CAUTION,
+                  "{count} samples are stamped far off those beside them in the file{where}; they were left out", _CHECK),
     "spike": Kind("telemetry.spikes", Severity.CAUTION, "{count} spikes were left out{where}", _CHECK),
     "stuck": Kind("telemetry.stuck", Severity.CAUTION,
                   "a noisy sensor repeats one value for {count} samples{where}; they were left out", _CHECK),
