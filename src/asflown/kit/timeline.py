@@ -166,7 +166,9 @@ def et_to_tai_ns(seconds) -> np.ndarray:
     if np.any(np.abs(day - _JD_ORIGIN) > _MOST_DAYS):
         raise ValueError("the time is outside the range of int64 nanoseconds")
     whole = np.floor(day - 0.5) + 0.5
-    return np.rint((whole - _JD_ORIGIN) * _DAY_NS).astype(np.int64) + np.rint((day - whole + rest) * _DAY_NS).astype(np.int64)
+    return np.rint((whole - _JD_ORIGIN) * _DAY_NS).astype(np.int64) + np.rint((day - whole + rest) * _DAY_NS).astype(
+        np.int64
+    )
 
 
 def utc_label(tai_ns: int, digits: int = 0) -> str:
@@ -190,7 +192,9 @@ def cadence_ns(tai_ns: np.ndarray) -> int:
     """A channel's own cadence: the median step of its samples (0 with fewer than two)."""
     if len(tai_ns) < 2:
         return 0
-    return int(np.median(np.diff(tai_ns)))
+    steps = np.diff(tai_ns)
+    first = int(steps[0])
+    return first if (steps == first).all() else int(np.median(steps))
 
 
 def runs(known: np.ndarray) -> list[slice]:

@@ -107,7 +107,10 @@ def channel_from(table: Table, use: Use, tai_ns: np.ndarray, findings: list[Find
         if len(values) and np.max(np.abs(values)) > _LARGEST:
             row = int(rows[np.argmax(np.abs(values))])
             raise BadInput(
-                "the value is too large for a measurement", line=table.line(row), channel=use.name, remedy="Correct it, or declare it as a fill value."
+                "the value is too large for a measurement",
+                line=table.line(row),
+                channel=use.name,
+                remedy="Correct it, or declare it as a fill value.",
             )
         if use.scale != 1 or use.offset != 0:
             values = values * use.scale + use.offset
@@ -193,7 +196,9 @@ def origin_of(epoch: str | None) -> int | None:
     try:
         return int(utc_to_tai_ns(epoch))
     except BadInput:
-        raise BadInput(f"the epoch {epoch[:60]!r} is not a time", remedy="Write '# epoch: 2015-09-29T00:00:00 UTC'.") from None
+        raise BadInput(
+            f"the epoch {epoch[:60]!r} is not a time", remedy="Write '# epoch: 2015-09-29T00:00:00 UTC'."
+        ) from None
 
 
 _LARGEST = 1e60  # larger values overflow when squared or converted; no measurement reaches them

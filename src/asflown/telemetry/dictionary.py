@@ -402,7 +402,11 @@ def _raw(read: Read, parts: list[Part], said: QuaternionEntry | EulerEntry) -> t
     for t, _ in columns[1:]:
         common = np.intersect1d(common, t)
     if len(common) == 0:
-        raise BadInput("the columns of the attitude have no common sample", channel="quaternion", remedy="Check [quaternion] or [euler].")
+        raise BadInput(
+            "the columns of the attitude have no common sample",
+            channel="quaternion",
+            remedy="Check [quaternion] or [euler].",
+        )
     # file order is kept, so that disorder and duplicates are seen by the screening
     kept = [(t[np.isin(t, common)], v[np.isin(t, common)]) for t, v in columns]
     if any(len(t) != len(kept[0][0]) or (t != kept[0][0]).any() for t, _ in kept):

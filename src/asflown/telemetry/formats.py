@@ -59,7 +59,9 @@ def read_parquet(path: Path) -> Table:
     except duckdb.Error as why:
         raise damaged("Parquet", why) from None
     epoch = next((v for k, v in notes if said(k).strip().lower() == "epoch"), None)
-    return checked(Table(tuple(found), tuple(typed(c) for c in found.values()), epoch=None if epoch is None else said(epoch)))
+    return checked(
+        Table(tuple(found), tuple(typed(c) for c in found.values()), epoch=None if epoch is None else said(epoch))
+    )
 
 
 # ---- NetCDF and HDF5 --------------------------------------------------------------------------------
@@ -146,7 +148,13 @@ def _coordinate_table(data, clock: str, others: list) -> Table:
             headings.append(member if unit is None else f"{member} [{unit}]")
             columns.append(values)
     return checked(
-        Table(tuple(headings), tuple(columns), epoch=epoch, blanked=blanked, instants={} if instants is None else {0: instants})
+        Table(
+            tuple(headings),
+            tuple(columns),
+            epoch=epoch,
+            blanked=blanked,
+            instants={} if instants is None else {0: instants},
+        )
     )
 
 
@@ -284,17 +292,23 @@ def read_cdf(path: Path) -> list[Table]:
         raise damaged("CDF", why) from None
     tables = []
     for clock, variables in by_clock.items():
-        columns: list = [(clock if clock.lower() == "time" else f"time_{clock}", "utc", np.asarray(clocks[clock]), None)]
+        columns: list = [
+            (clock if clock.lower() == "time" else f"time_{clock}", "utc", np.asarray(clocks[clock]), None)
+        ]
         for name, attributes, values in variables:
             ends = [attributes.get(k) for k in ("VALIDMIN", "VALIDMAX")]
             if values.dtype.kind in "iuf" and all(np.size(e) == 1 for e in ends if e is not None):
                 low, high = (-np.inf if ends[0] is None else float(np.ravel(ends[0])[0])), (np.inf if ends[1] is None else float(np.ravel(ends[1])[0]))  # fmt: skip
                 fill = attributes.get("FILLVAL")
-                values = np.where((values < low) | (values > high), np.nan if fill is None else float(np.ravel(fill)[0]), values)
+                values = np.where(
+                    (values < low) | (values > high), np.nan if fill is None else float(np.ravel(fill)[0]), values
+                )
             columns.append((name, said(attributes.get("UNITS", "")).strip() or None, values, attributes.get("FILLVAL")))
         tables.append(_from_arrays(columns))
     if not tables:
-        raise BadInput("no variable of the CDF file depends on a time (DEPEND_0)", remedy="Write it after the ISTP guidelines.")
+        raise BadInput(
+            "no variable of the CDF file depends on a time (DEPEND_0)", remedy="Write it after the ISTP guidelines."
+        )
     return tables
 
 
@@ -311,7 +325,9 @@ def read_matlab(path: Path) -> list[Table]:
         if name.startswith("__"):
             continue
         fields = {f: getattr(value, f) for f in value._fieldnames} if hasattr(value, "_fieldnames") else {name: value}
-        arrays |= {f: np.asarray(v) for f, v in fields.items() if np.ndim(v) in (1, 2) and np.asarray(v).dtype.kind in "iufUSb"}
+        arrays |= {
+            f: np.asarray(v) for f, v in fields.items() if np.ndim(v) in (1, 2) and np.asarray(v).dtype.kind in "iufUSb"
+        }
     return [_by_length(arrays, "MATLAB")]
 
 
@@ -362,7 +378,9 @@ def read_excel(path: Path) -> list[Table]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-            sheets = {s.title: [[_cell(c) for c in row] for row in s.iter_rows(values_only=True)] for s in book.worksheets}
+            sheets = {
+                s.title: [[_cell(c) for c in row] for row in s.iter_rows(values_only=True)] for s in book.worksheets
+            }
             book.close()
     except Exception as why:  # openpyxl raises many kinds for damaged files
         raise damaged("Excel", why) from None

@@ -32,10 +32,12 @@ class Table:
     epoch: str | None = None  # UTC, as written
     notes: tuple[str, ...] = ()  # how the file was read, where there was a choice
     instants: dict[int, np.ndarray] = field(default_factory=dict)  # columns read as times already: ns of their scale
-    blanked: dict[int, np.ndarray] = field(default_factory=dict)  # rows of a column that the file declares as fill or out of range
+    blanked: dict[int, np.ndarray] = field(
+        default_factory=dict
+    )  # rows of a column that the file declares as fill or out of range
 
     def __len__(self) -> int:
-        return max((len(c) for c in self.columns), default=0)
+        return max((len(c) for c in (*self.columns, *self.instants.values())), default=0)
 
     def line(self, row: int) -> int | None:
         return int(self.lines[row]) if len(self.lines) else None
@@ -144,6 +146,8 @@ def times_of(table: Table, column: int, scale: Scale, origin_ns: int = 0) -> np.
         raise _no_time(table, column, why, scale) from None
     try:
         return scale.tai_ns(ns, origin_ns)
+    except BadInput:
+        raise
     except ValueError:
         raise BadInput("the times are outside the calendar", remedy="Check the scale of the time column.") from None
 
@@ -168,7 +172,11 @@ def _no_time(table: Table, column: int, why: NotATime, scale: Scale) -> BadInput
         "pattern": f"Every row needs a time of the declared form {scale.pattern!r}.",
     }.get(scale.kind, "Every row needs a time, a number.")
     reason = f" ({why.why.rpartition('(')[2]}" if why.why.endswith(")") else ""
-    return BadInput(f"{_shown(cell)} in column {table.headings[column]!r} is not a time{reason}", line=table.line(why.row), remedy=remedy)
+    return BadInput(
+        f"{_shown(cell)} in column {table.headings[column]!r} is not a time{reason}",
+        line=table.line(why.row),
+        remedy=remedy,
+    )
 
 
 def _shown(cell: object) -> str:

@@ -90,6 +90,15 @@ class Channel:
         return segments(self.tai_ns, BRIDGED, self.cadence_ns)
 
 
+def common_instants(parts: list[Channel]) -> np.ndarray:
+    """Instants at which all the channels were sampled. [ns TAI]"""
+    instants = parts[0].tai_ns
+    for p in parts[1:]:
+        if p.tai_ns is not instants and not np.array_equal(p.tai_ns, instants):
+            instants = np.intersect1d(instants, p.tai_ns, assume_unique=True)
+    return instants
+
+
 @dataclass(frozen=True)
 class Telemetry:
     """Screened telemetry of one file or flight, as ``load_telemetry`` returns it.

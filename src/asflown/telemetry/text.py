@@ -40,7 +40,10 @@ _HEAD_LINES, _HEAD_BYTES = 200, 1 << 20
 SLOW_LIMIT = 200_000_000
 #: A packed table is unpacked up to this size. [bytes]
 UNPACKED_LIMIT = 8_000_000_000
-_NUMBER = re.compile(r"[+-]?(?:\d{1,400}(?:[.,]\d{0,400})?|[.,]\d{1,400})(?:[eE][+-]?\d{1,5})?|nan|[+-]?inf(?:inity)?", re.IGNORECASE | re.ASCII)
+_NUMBER = re.compile(
+    r"[+-]?(?:\d{1,400}(?:[.,]\d{0,400})?|[.,]\d{1,400})(?:[eE][+-]?\d{1,5})?|nan|[+-]?inf(?:inity)?",
+    re.IGNORECASE | re.ASCII,
+)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d{0,400},\d{1,400}(?:[eE][+-]?\d{1,5})?", re.ASCII)
 
 
@@ -171,7 +174,9 @@ def form_of(lines: Sequence[str]) -> Form:
     return form_of_rows([(n, _cells(line, delimiter)) for n, line in rows], delimiter, epoch, named)
 
 
-def form_of_rows(cells: list[tuple[int, list[str]]], delimiter: str = ",", epoch: str | None = None, comment=None) -> Form:
+def form_of_rows(
+    cells: list[tuple[int, list[str]]], delimiter: str = ",", epoch: str | None = None, comment=None
+) -> Form:
     """How a table of cells is written, from its first lines, each with its number.
 
     The header is the last line of names above the first row of numbers, or the last ``comment`` where there is none; a row of units
@@ -282,7 +287,11 @@ def _without_spare(headings: list[str], body: list[list[str]], width: int, line:
 def _decimal_of(body: list[list[str]]) -> str:
     cells = [c.strip() for row in body for c in row]
     comma = sum(bool(_DECIMAL_COMMA.fullmatch(c)) for c in cells)
-    return "," if comma and not any(re.fullmatch(r"[+-]?\d{0,400}\.\d{1,400}(?:[eE][+-]?\d{1,5})?", c) for c in cells) else "."
+    return (
+        ","
+        if comma and not any(re.fullmatch(r"[+-]?\d{0,400}\.\d{1,400}(?:[eE][+-]?\d{1,5})?", c) for c in cells)
+        else "."
+    )
 
 
 # ---- the columns ------------------------------------------------------------------------------------
@@ -333,7 +342,9 @@ class TextFile:
 _ISO = r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(\.\d{1,9})?(Z|\+00:00| UTC)?"
 
 
-def _by_duckdb(file: TextFile, time: int, scale: Scale, numbers: tuple[int, ...], words: tuple[int, ...]) -> Table | None:
+def _by_duckdb(
+    file: TextFile, time: int, scale: Scale, numbers: tuple[int, ...], words: tuple[int, ...]
+) -> Table | None:
     """The used columns by DuckDB; None where the text needs the csv module, or a cell is not what it should be."""
     import duckdb
 
@@ -388,7 +399,12 @@ def _table(file: TextFile, found, time: int, scale: Scale, numbers, words) -> Ta
     first = file.form.first_line
     lines = range(first, first + len(ns))
     return Table(
-        file.headings, tuple(columns), lines, file.epoch, file.notes, {time: posix_to_tai_ns(ns) if scale.kind == "utc" else ns}
+        file.headings,
+        tuple(columns),
+        lines,
+        file.epoch,
+        file.notes,
+        {time: posix_to_tai_ns(ns) if scale.kind == "utc" else ns},
     )
 
 
@@ -431,7 +447,9 @@ def _cell_by_cell(text: str, form: Form) -> Table:
             )
     columns = tuple(zip(*rows, strict=True))[: len(form.headings)] if rows else ((),) * len(form.headings)
     if form.decimal == ",":
-        columns = tuple(tuple(c.replace(",", ".") if _DECIMAL_COMMA.fullmatch(c.strip()) else c for c in col) for col in columns)
+        columns = tuple(
+            tuple(c.replace(",", ".") if _DECIMAL_COMMA.fullmatch(c.strip()) else c for c in col) for col in columns
+        )
     return checked(Table(form.headings, columns, lines, form.epoch, form.notes))
 
 

@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass
 from datetime import datetime
 from decimal import Context, Decimal, InvalidOperation
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -61,7 +62,7 @@ class Scale:
             if len(ns) and 0 <= int(ns.min()) and int(ns.max()) <= WEEK_S * NS:
                 raise BadInput(
                     f"the GPS seconds are below {WEEK_S}: they count within a week, and the week is not given",
-                    remedy='Give the week too: columns = [week, seconds] and format = "gps week s" under [time] of a channel dictionary.',
+                    remedy='Give the week too, under [time] of a channel dictionary: columns = ["WEEK", "TOW"], units = ["week", "s"], format = "gps s".',
                 )
             return ns + int(gps_to_tai_ns(0.0))
         if self.kind == "et":
@@ -117,7 +118,11 @@ def _exact_of_numbers(values: np.ndarray, scale: Scale) -> np.ndarray | None:
         if power > factor * 100 or not (np.abs(whole) < 9e14).all() or not (whole / power == values).all():
             continue
         origin = scale.origin * power
-        if origin == int(origin) and factor % power == 0 and np.max(np.abs(whole - float(origin)), initial=0) * (factor // power) < _LONGEST_NS:
+        if (
+            origin == int(origin)
+            and factor % power == 0
+            and np.max(np.abs(whole - float(origin)), initial=0) * (factor // power) < _LONGEST_NS
+        ):
             return (whole.astype(np.int64) - int(origin)) * (factor // power)
     return None
 
@@ -158,13 +163,19 @@ def joined_ns(table, columns, units, factor: Decimal, scale: Scale, origin_ns: i
     try:
         if not scale.numeric:
             return dated_ns([" ".join(str(c).strip() for c in row) for row in zip(*parts, strict=True)], scale)
-        ns = np.zeros(len(parts[0]), np.int64)
+        ns = np.zeros(len(table), np.int64)
         for column, unit, cells in zip(columns, units or [scale.unit] * len(columns), parts, strict=True):
             at = column
-            if unit == "week":
+            if column in table.instants:  # read already, in the scale's unit and less its origin
+                ratio = Fraction(factor)
+                whole = table.instants[column].astype(object) * ratio.numerator // ratio.denominator
+                ns += whole.astype(np.int64) + int(scale.origin * UNITS_NS[scale.unit])
+            elif unit == "week":
                 ns += exact_ns(cells, Scale("", "d")) * 7
             elif factor != 1:
-                ns += exact_ns([format(_EXACT.multiply(_decimal(c, i), factor), "f") for i, c in enumerate(cells)], Scale("", unit))
+                ns += exact_ns(
+                    [format(_EXACT.multiply(_decimal(c, i), factor), "f") for i, c in enumerate(cells)], Scale("", unit)
+                )
             else:
                 ns += exact_ns(cells, Scale("", unit))
         return scale.tai_ns(ns - int(scale.origin * UNITS_NS[scale.unit]), origin_ns)
