@@ -11,7 +11,7 @@ import numpy as np
 from ..kit.errors import BadInput, some_of
 from ..kit.timeline import utc_to_posix_ns
 from .channels import member_names
-from .tables import Table, checked, quoted_pattern, said, typed
+from .tables import Table, checked, quiet_database, quoted_pattern, said, typed
 from .text import form_of_rows
 from .times import exact_ns, scale_called
 
@@ -52,7 +52,7 @@ def read_parquet(path: Path) -> Table:
 
     place = quoted_pattern(path)
     try:
-        with duckdb.connect() as db:
+        with quiet_database() as db:
             db.execute("SET TimeZone = 'UTC'")
             found = db.execute("SELECT * FROM read_parquet(?, hive_partitioning = false)", [place]).fetchnumpy()
             notes = db.execute("SELECT key, value FROM parquet_kv_metadata(?)", [place]).fetchall()

@@ -6,7 +6,9 @@ quantisation would produce, and reports only what they do not explain.
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -67,19 +69,11 @@ def screen(telemetry: Telemetry, craft=None) -> Telemetry:
     for look in (_of_one_sign, _without_unfilled):
         channels, found = look(channels)
         findings += found
-    steps = {}
-    for name, c in list(channels.items()):
-        if c.kind.behaves == "state":
-            findings += _pauses(c)
-            continue
-        step = steps[name] = max(c.count_size, quantisation_step(c.values))
-        c, found = _within_limits(_unwrapped(c, findings), craft)
-        findings += found
-        for test in (_without_fills, _without_plateaus, _without_spikes, _without_stuck, _without_repeats):
-            c, found = test(c, step)
-            findings += found
-        findings += _falls(c) + _pauses(c)
-        channels[name] = c
+    with ThreadPoolExecutor() as pool:  # sorting and differencing run beside each other
+        screened = list(pool.map(partial(_screened, craft=craft), channels.values()))
+    steps = {c.name: step for c, step, _ in screened if c.kind.behaves != "state"}
+    channels = {c.name: c for c, _, _ in screened}
+    findings += [f for _, _, found in screened for f in found]
     channels, found = _without_repeated_frames(channels, steps)
     findings += found
     channels, found = _whole_quaternions(channels)
@@ -93,6 +87,20 @@ def screen(telemetry: Telemetry, craft=None) -> Telemetry:
         findings=(*telemetry.findings, *findings),
         doubts=telemetry.doubts + _implausible(channels, craft),
     )
+
+
+def _screened(c: Channel, craft) -> tuple[Channel, float, list[Finding]]:
+    """One channel with unusable samples marked, its quantisation step, and what was found."""
+    if c.kind.behaves == "state":
+        return c, 0.0, _pauses(c)
+    step = max(c.count_size, quantisation_step(c.values))
+    findings: list[Finding] = []
+    c, found = _within_limits(_unwrapped(c, findings), craft)
+    findings += found
+    for test in (_without_fills, _without_plateaus, _without_spikes, _without_stuck, _without_repeats):
+        c, found = test(c, step)
+        findings += found
+    return c, step, [*findings, *_falls(c), *_pauses(c)]
 
 
 # ---- pauses -----------------------------------------------------------------------------------------
@@ -222,9 +230,10 @@ def _without_fills(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
         return c, []
     fill = np.zeros(len(values), bool)
     for _ in range(3):  # more than one fill value may occur, the farthest first
-        rest = values[~fill]
+        rest = values[~fill] if fill.any() else values
         centre = float(np.median(rest))
-        far = float(rest[np.argmax(np.abs(rest - centre))])
+        low, high = float(np.min(rest)), float(np.max(rest))
+        far = high if high - centre > centre - low else low
         here = (values == far) & ~fill
         others = values[~fill & ~here]
         if here.sum() < 2 or len(others) < _FEWEST or far == 0:
@@ -260,12 +269,13 @@ def _without_plateaus(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     """A sensor at the end of its range: the channel's largest or smallest value held, entered and left at once."""
     if c.kind.stem not in _MEASURED or len(c.values) < _FEWEST:
         return c, []
-    change = np.abs(np.diff(c.values))
     flat = np.zeros(len(c.values), bool)
-    floor = max(3 * step, 3 * sample_noise(c))
     for extreme in (np.max(c.values), np.min(c.values)):
         starts, stops = _runs_of(c.values == extreme)
         inside = (starts > 0) & (stops < len(c.values)) & (stops - starts >= _PLATEAU)
+        if not inside.any():
+            continue
+        change, floor = np.abs(np.diff(c.values)), max(3 * step, 3 * sample_noise(c))
         for start, stop in zip(starts[inside].tolist(), stops[inside].tolist(), strict=True):
             flat[start:stop] = change[start - 1] > floor and change[stop - 1] > floor
     return _marked(
@@ -338,7 +348,7 @@ def _without_stuck(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
 def _without_repeats(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     """Short runs of one value in a noisy channel, more frequent than quantisation produces."""
     change = np.diff(c.values)
-    if c.kind.stem not in _MEASURED | {"control_torque"} or len(change) < 20 or not change.any():
+    if c.kind.stem not in _MEASURED | {"control_torque"} or len(change) < 20 or change.all() or not change.any():
         return c, []
     step = max(step, 1e-15 * float(np.max(np.abs(c.values))))
     moves = np.abs(change[change != 0])
@@ -441,16 +451,13 @@ def _without_repeated_frames(channels: dict[str, Channel], steps: dict[str, floa
     channels, findings = dict(channels), []
     moving = {n: c for n, c in channels.items() if n in steps and np.any(c.values[1:] != c.values[:-1])}
     for names in _frames(moving, _MEASURED):
-        whole = np.ones(len(channels[names[0]].values) - 1, bool)
-        by_chance = float(whole.size)
-        for n in names:
-            change = np.diff(channels[n].values)
-            whole &= change == 0
-            moves = np.abs(change[change != 0])
-            share = float(np.mean(change == 0))
-            if float(np.median(moves)) >= _FINE * steps[n]:  # a fine channel seldom repeats by chance
-                share = min(share, _zeros_by_chance(moves, max(steps[n], 1e-15)) / whole.size)
-            by_chance *= share
+        values = [channels[n].values for n in names]
+        whole = np.logical_and.reduce([v[1:] == v[:-1] for v in values])
+        if not whole.any():
+            continue
+        by_chance = whole.size * float(
+            np.prod([_repeats_by_chance(v, steps[n]) for n, v in zip(names, values, strict=True)])
+        )
         # a long run of equal frames, or one at either end, is rest and not repetition
         starts, stops = _runs_of(whole)
         for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
@@ -465,6 +472,15 @@ def _without_repeated_frames(channels: dict[str, Channel], steps: dict[str, floa
             Finding("", "repeat", int(hit.sum()), first, f"frames of {len(names)} channels repeat the previous frame bit for bit; not used")
         )  # fmt: skip
     return channels, findings
+
+
+def _repeats_by_chance(values: np.ndarray, step: float) -> float:
+    """Share of the samples that repeat the last one by chance; a fine channel does so seldom."""
+    change = np.diff(values)
+    share, moves = float(np.mean(change == 0)), np.abs(change[change != 0])
+    if float(np.median(moves)) < _FINE * step:
+        return share
+    return min(share, _zeros_by_chance(moves, max(step, 1e-15)) / change.size)
 
 
 def _without_unfilled(channels: dict[str, Channel]) -> tuple[dict[str, Channel], list[Finding]]:

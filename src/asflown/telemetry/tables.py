@@ -184,6 +184,15 @@ def _shown(cell: object) -> str:
     return text if len(text) <= 60 else text[:57] + "…'"
 
 
+def quiet_database():
+    """DuckDB in memory, without its progress bar, which would be written among results."""
+    import duckdb
+
+    db = duckdb.connect()
+    db.execute("SET enable_progress_bar = false")
+    return db
+
+
 def quoted_pattern(path: Path) -> str:
     """A path for DuckDB, which reads names as patterns: each special character stands for itself."""
     return "".join(f"[{c}]" if c in "*?[" else c for c in str(path.absolute()))

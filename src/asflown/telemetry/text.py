@@ -24,7 +24,7 @@ from ..kit.errors import BadInput
 from ..kit.quantities import is_unit
 from ..kit.timeline import posix_to_tai_ns
 from .channels import split_header
-from .tables import Table, check_headings, checked, quoted_pattern, typed
+from .tables import Table, check_headings, checked, quiet_database, quoted_pattern, typed
 from .times import DECIMALS, UNITS_NS
 
 if TYPE_CHECKING:
@@ -365,7 +365,7 @@ def _by_duckdb(
         f"compression='none', skip={file.form.first_line - 1}, delim=$delimiter, columns=$columns"
     )
     try:
-        with duckdb.connect() as db:
+        with quiet_database() as db:
             found = db.execute(
                 f"SELECT {', '.join(chosen)} FROM read_csv($path, {how})",
                 {
