@@ -62,7 +62,9 @@ class Columns:
         if name == "time":
             if scale_called(unit or "utc") is None:
                 raise BadInput(
-                    f"the time scale [{unit}] is not known", channel=name, remedy="Write one of: utc, s, gps s, et s, unix s, mjd, jd."
+                    f"the time scale [{unit}] is not known",
+                    channel=name,
+                    remedy="Write one of: utc, s, gps s, et s, unix s, mjd, jd.",
                 )
         elif name in NUMBERS:
             if unit is None:
@@ -77,6 +79,14 @@ class Columns:
                 f"{heading[:60]!r} is not a column of a maneuver table", channel=name[:60] or None,
                 remedy=(f"Did you mean {some_of(near)}? " if near else "") + "docs/maneuvers.md lists the columns; 'note' is free text.",
             )  # fmt: skip
+
+    def some(self, rows: list[int]) -> Columns:
+        """The same columns with some of the rows."""
+        return (
+            self
+            if len(rows) == len(self)
+            else Columns(self.table.take(np.array(rows, np.int64), range(len(self.table.headings))))
+        )
 
     def need(self, *names: str) -> None:
         missing = [n for n in names if n not in self.at]

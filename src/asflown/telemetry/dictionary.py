@@ -33,7 +33,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ..kit.config import read_bytes, toml_table, validated
 from ..kit.errors import BadInput, some_of
-from ..kit.quantities import quantity, si_factor
+from ..kit.quantities import is_unit, quantity, si_factor
 from ..kit.rotations import euler, lvlh_to_inertial, quaternion, rotation
 from ..kit.timeline import NS
 from .assemble import Clock, Part, Read, Use, assembled
@@ -303,10 +303,41 @@ def translated(tables: list[Table] | list[TextFile], entry: ChannelDictionary) -
     read = assembled(parts, entry.time.epoch if elapsed else None, alone=entry.attitude is None)
     if entry.attitude:
         _add_attitude(read, parts, entry.attitude)
+    read.findings += [f for t in tables for f in _contradicted(t, entry, read.epoch_ns)]
     if ignored:
         detail = f"columns the dictionary does not mention: {some_of(dict.fromkeys(ignored))}"
         read.findings.append(Finding("", "ignored", len(set(ignored)), read.epoch_ns, detail))
     return read
+
+
+def _contradicted(table: Table | TextFile, entry: ChannelDictionary, epoch_ns: int) -> list[Finding]:
+    """Columns whose heading names another unit than the dictionary, which scales them by nothing else."""
+    said = {name: unit for h in table.headings for name, unit in [split_header(h) or (h, None)] if unit is not None}
+    headed = {h: (split_header(h) or (h, None))[1] for h in table.headings} | said
+    found = []
+    for c in entry.channel:
+        unit = headed.get(c.column)
+        if unit and c.scale == 1 and c.offset == 0 and not c.count and is_unit(unit) and _differ(c.name, unit, c.unit):
+            detail = f"the heading of {c.column!r} says [{unit}], the channel dictionary [{c.unit}]; the dictionary was followed"
+            found.append(Finding(c.name, "unit", 1, epoch_ns, detail))
+    time, scale = entry.time, scale_called(entry.time.format)
+    heading = scale_called(headed.get(time.column or "") or "")
+    if (
+        scale is not None
+        and heading is not None
+        and time.scale == 1
+        and (heading.unit != scale.unit or (heading.dated and heading != scale))
+    ):
+        detail = f"the heading of {time.column!r} says [{headed[time.column]}], the channel dictionary {time.format!r}; the dictionary was followed"
+        found.append(Finding("", "unit", 1, epoch_ns, detail))
+    return found
+
+
+def _differ(name: str, one: str, other: str) -> bool:
+    try:
+        return to_si(name, one) != to_si(name, other)
+    except BadInput:
+        return True
 
 
 def _wanted(entry: ChannelDictionary) -> set[str]:

@@ -6,6 +6,7 @@ quantisation would produce, and reports only what they do not explain.
 
 from __future__ import annotations
 
+import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -69,7 +70,9 @@ def screen(telemetry: Telemetry, craft=None) -> Telemetry:
     for look in (_of_one_sign, _without_unfilled):
         channels, found = look(channels)
         findings += found
-    with ThreadPoolExecutor() as pool:  # sorting and differencing run beside each other
+    with ThreadPoolExecutor(
+        min(len(channels), os.cpu_count() or 1) or 1
+    ) as pool:  # sorting and differencing run beside each other
         screened = list(pool.map(partial(_screened, craft=craft), channels.values()))
     steps = {c.name: step for c, step, _ in screened if c.kind.behaves != "state"}
     channels = {c.name: c for c, _, _ in screened}

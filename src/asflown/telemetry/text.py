@@ -211,16 +211,18 @@ def _cells(line: str, delimiter: str) -> list[str]:
 
 
 def _delimiter_of(lines: list[str]) -> str:
-    """The delimiter under which most rows have the same number of cells, more than one, and most cells are numbers."""
+    """The delimiter under which most cells hold no other delimiter, most rows have the same number of cells, and that is largest."""
+
+    def whole(cell: str) -> bool:
+        return bool(_NUMBER.fullmatch(cell)) or not any(d in cell for d in _DELIMITERS)
 
     def score(delimiter: str) -> tuple[float, float, int]:
         rows = [_cells(line, delimiter) for line in lines[len(lines) // 2 :][:50]]
         width, alike = Counter(len(r) for r in rows).most_common(1)[0]
         if width < 2 and len(_cells(lines[0], delimiter)) < 2:
             return 0.0, 0.0, 0
-        filled = [c.strip() for r in rows for c in r if c.strip()]
-        numbers = sum(bool(_NUMBER.fullmatch(c)) for c in filled) / max(len(filled), 1)
-        return numbers, alike / len(rows), width
+        cells = [c.strip() for r in rows for c in r]
+        return sum(map(whole, cells)) / max(len(cells), 1), alike / len(rows), width
 
     if not lines:
         return ","
