@@ -149,8 +149,8 @@ def _without_second_copies(channels: dict[str, Channel]) -> tuple[dict[str, Chan
         steps = np.diff(c.tai_ns)
         if c.kind.behaves != "sensor" or len(steps) < 30 or (steps == steps[0]).all():
             continue
-        after = np.concatenate((steps[1:], steps[-1:]))
-        close = steps < _AT_ONCE * after
+        beside = np.maximum(np.concatenate((steps[1:], [0])), np.concatenate(([0], steps[:-1])))
+        close = steps < _AT_ONCE * beside
         if close.mean() < 0.3:
             continue
         second = np.concatenate(([False], close))
