@@ -199,6 +199,7 @@ def test_law_both_readers_give_the_same_to_the_last_digit(tmp_path_factory, numb
 
 def test_law_a_usual_table_takes_the_fast_way(tmp_path, monkeypatch):
     monkeypatch.setattr(text, "_cell_by_cell", None)
+    monkeypatch.setattr(text, "SMALL", 0)
     stamps = [(datetime.datetime(2023, 8, 11) + datetime.timedelta(seconds=i)).isoformat() for i in range(50)]
     for head, cells in (
         ("time [s]", range(50)),

@@ -73,6 +73,16 @@ def parse_unit(text: str):
     )
 
 
+#: Factors of units that nearly every file has, so that astropy need not be loaded for them; a test holds them to astropy's.
+_COMMON = {
+    ("rpm", "rad/s"): 2 * 3.141592653589793 / 60, ("deg/s", "rad/s"): 3.141592653589793 / 180, ("mrad/s", "rad/s"): 1e-3,
+    ("urad/s", "rad/s"): 1e-6, ("deg", "rad"): 3.141592653589793 / 180, ("mrad", "rad"): 1e-3, ("urad", "rad"): 1e-6,
+    ("arcsec", "rad"): 3.141592653589793 / 648_000, ("ms", "s"): 1e-3, ("min", "s"): 60.0, ("h", "s"): 3600.0, ("mN m", "N m"): 1e-3,
+    ("uN m", "N m"): 1e-6, ("mN", "N"): 1e-3, ("km", "m"): 1e3, ("mm", "m"): 1e-3, ("cm", "m"): 1e-2, ("km/s", "m/s"): 1e3,
+    ("mm/s", "m/s"): 1e-3, ("nT", "T"): 1e-9, ("uT", "T"): 1e-6, ("mA", "A"): 1e-3, ("kPa", "Pa"): 1e3, ("mHz", "Hz"): 1e-3,
+}  # fmt: skip
+
+
 def is_unit(text: str) -> bool:
     """Whether ``text`` names a unit."""
     try:
@@ -88,6 +98,10 @@ def si_factor(text: str, expected: str) -> float:
 
     The radian counts as a unit: rad/s is not accepted for Hz.
     """
+    if text == expected:
+        return 1.0
+    if (text, expected) in _COMMON:
+        return _COMMON[text, expected]
     got, want = parse_unit(text), parse_unit(expected)
     if expected == "N m" and re.search(r"J|eV|erg|cal", text):
         raise BadInput(f"[{text}] is a unit of energy, not of torque", remedy="Write [N m].")

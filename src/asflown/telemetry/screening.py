@@ -279,8 +279,13 @@ def _without_plateaus(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
         if not inside.any():
             continue
         change, floor = np.abs(np.diff(c.values)), max(3 * step, 3 * sample_noise(c))
-        for start, stop in zip(starts[inside].tolist(), stops[inside].tolist(), strict=True):
-            flat[start:stop] = change[start - 1] > floor and change[stop - 1] > floor
+        starts, stops = starts[inside], stops[inside]
+        abrupt = (change[starts - 1] > floor) & (change[stops - 1] > floor)
+        starts, stops = starts[abrupt], stops[abrupt]
+        if len(starts) < 2 and not (stops - starts >= 2 * _PLATEAU).any():
+            continue  # one short plateau may be the top of a curve
+        for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
+            flat[start:stop] = True
     return _marked(
         c, flat, "saturated", "the channel's extreme value is held: a sensor at the end of its range? Not used"
     )

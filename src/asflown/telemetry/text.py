@@ -38,6 +38,8 @@ _DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
 _HEAD_LINES, _HEAD_BYTES = 200, 1 << 20
 #: Text beyond this is not read cell by cell in Python. [bytes]
 SLOW_LIMIT = 200_000_000
+#: Text up to this is read cell by cell at once: DuckDB takes longer to load. [bytes]
+SMALL = 500_000
 #: A packed table is unpacked up to this size. [bytes]
 UNPACKED_LIMIT = 8_000_000_000
 _NUMBER = re.compile(
@@ -322,7 +324,8 @@ class TextFile:
     def parsed(self, time: Iterable[int], scale: Scale, numbers: Iterable[int], words: Iterable[int]) -> Table:
         """The table with the columns that are used, by DuckDB where it can tell them, else cell by cell."""
         time = tuple(time)
-        fast = _by_duckdb(self, time[0], scale, tuple(numbers), tuple(words)) if len(time) == 1 else None
+        large = self.path.stat().st_size > SMALL
+        fast = _by_duckdb(self, time[0], scale, tuple(numbers), tuple(words)) if large and len(time) == 1 else None
         return self.whole() if fast is None else fast
 
     def whole(self) -> Table:
