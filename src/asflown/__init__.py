@@ -174,7 +174,7 @@ if TYPE_CHECKING:
     from asflown.sim.mission import Mission, fly_mission, load_mission
     from asflown.sim.scenario import Scenario, load_scenario
     from asflown.telemetry.load import load_telemetry
-    from asflown.telemetry.write import write_table
     from asflown.telemetry.telemetry import Telemetry
+    from asflown.telemetry.write import write_table
     from asflown.trends.entries import figure_of_merit
     from asflown.trends.store import TrendStore
