@@ -146,6 +146,22 @@ def posix_to_tai_ns(posix_ns: np.ndarray) -> np.ndarray:
     return posix_ns + (offsets[posix_ns // _DAY_NS - low] - _DAY_2000 * _DAY_NS)
 
 
+def tai_to_datetime64(tai_ns: np.ndarray) -> np.ndarray:
+    """ns TAI as datetime64[ns] in UTC, which skips leap seconds: an instant within one reads as the next second."""
+    posix = np.asarray(tai_ns, np.int64) + _DAY_2000 * _DAY_NS
+    if len(posix) == 0:
+        return posix.astype("datetime64[ns]")
+    guess = posix - _offsets_at(
+        posix
+    )  # TAI minus UTC is that of the day of UTC: the second look settles instants near midnight
+    return (posix - _offsets_at(guess)).astype("datetime64[ns]")
+
+
+def _offsets_at(posix_ns: np.ndarray) -> np.ndarray:
+    days, which = np.unique(posix_ns // _DAY_NS, return_inverse=True)
+    return _tai_minus_utc_ns(days)[which]
+
+
 def gps_to_tai_ns(seconds) -> np.ndarray:
     """GPS seconds (continuous since 1980-01-06 UTC, 19 s behind TAI) to ns TAI."""
     return np.rint(np.asarray(seconds, float) * NS).astype(np.int64) + utc_to_tai_ns("1980-01-06T00:00:00")

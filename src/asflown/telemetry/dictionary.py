@@ -161,10 +161,13 @@ class ChannelDictionary(_Part):
 
 
 def load_dictionary(path) -> ChannelDictionary:
-    """Read and check a dictionary.  Raises BadInput for a missing file, an unknown key, name or unit."""
-    source = read_bytes(path, "channel dictionary", "Give a TOML file; examples/ holds some.")
+    """Read and check a dictionary, from a file or a dict of its keys.  Raises BadInput for a missing file, an unknown key, name or unit."""
     remedy = "docs/telemetry.md lists the keys of a channel dictionary."
-    entry = validated(ChannelDictionary, toml_table(source, path), path, remedy)
+    if isinstance(path, dict):
+        entry, path = validated(ChannelDictionary, path, "channels", remedy), "channels"
+    else:
+        source = read_bytes(path, "channel dictionary", "Give a TOML file; examples/ holds some.")
+        entry = validated(ChannelDictionary, toml_table(source, path), path, remedy)
     try:
         _check(entry)
     except BadInput as why:

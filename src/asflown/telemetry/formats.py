@@ -74,12 +74,22 @@ def read_netcdf(path: Path) -> list[Table]:
     Values that the file declares as fill, or outside a declared range, are blanks.  Raises BadInput for no usable variable."""
     import xarray
 
+    return tables_of_dataset(_groups(path, xarray))
+
+
+def tables_of_dataset(groups: list) -> list[Table]:
+    """One table per time coordinate of xarray Datasets, not decoded or decoded."""
     tables, seen = [], []
-    for data in _groups(path, xarray):
+    for data in groups:
         seen += [str(n) for n in data.variables]
         for dim in data.sizes:
             clock = _clock(data, dim)
-            others = [n for n, v in data.variables.items() if v.dims[:1] == (dim,) and n != clock and v.ndim <= 2]
+            flags = {f"valid_{n}" for n in data.variables}  # as Telemetry.to_xarray writes them
+            others = [
+                n
+                for n, v in data.variables.items()
+                if v.dims[:1] == (dim,) and n != clock and v.ndim <= 2 and n not in flags
+            ]
             if clock is not None and others:
                 tables.append(_coordinate_table(data, clock, others))
     if not tables:
@@ -207,6 +217,8 @@ def _cf_time(clock, epoch) -> tuple[str, str | None, np.ndarray | None]:
     units = said(clock.attrs.get("units", "s")).strip()
     unit, since, start = units.partition(" since ")
     values = np.asarray(clock.values)
+    if values.dtype.kind == "M":  # decoded already
+        return "time [utc]", None, None
     if not since:
         return f"time [{units}]", None if epoch is None else said(epoch), None
     calendar = said(clock.attrs.get("calendar", "standard")).lower()

@@ -21,16 +21,17 @@ CLOCKS = ("sclk", "ert", "ground_receipt", "scet", "utc", "time")
 
 
 def load_telemetry(path, *, channels=None, exclude=None, craft=None) -> Telemetry:
-    """Read one telemetry file, screen it, and return its channels in SI.
+    """Read one telemetry file or table in memory, screen it, and return its channels in SI.
 
     Nothing is resampled.  Samples that must not be used are marked, not removed.
 
     Parameters
     ----------
-    path : str or Path
-        A text table (plain or gzip), Parquet, NetCDF, HDF5, FITS, CDF, MATLAB or Excel.
-    channels : str or Path, optional
-        Channel dictionary (TOML), where the table does not describe itself; docs/telemetry.md lists its keys.
+    path : str or Path, or table
+        A text table (plain or gzip), Parquet, NetCDF, HDF5, FITS, CDF, MATLAB or Excel; or a
+        pandas or polars DataFrame, an xarray Dataset, or a dict of arrays (name -> values, or name -> (values, unit)).
+    channels : str, Path or dict, optional
+        Channel dictionary (TOML, or a dict of the same keys), where the table does not describe itself; docs/telemetry.md lists its keys.
     exclude : str or Path, optional
         CSV of spans not to be used, with columns start, stop, channel, reason; start and stop in seconds from the
         epoch or in UTC, '*' for all channels.
@@ -51,10 +52,17 @@ def load_telemetry(path, *, channels=None, exclude=None, craft=None) -> Telemetr
     from .attitude import check_attitude
     from .screening import screen
 
-    path = Path(path)
+    of_file = isinstance(path, (str, Path))
+    path = Path(path) if of_file else path
+    name = str(path) if of_file else type(path).__name__
     try:
-        tables = _tables(path)
-        digest = sha256_of_file(path)
+        if of_file:
+            tables, digest = _tables(path), sha256_of_file(path)
+        else:
+            from .frames import digest_of, tables_of
+
+            tables = tables_of(path)
+            digest = digest_of(tables)
         if channels is None:
             read = _self_described(tables)
         else:
@@ -65,16 +73,16 @@ def load_telemetry(path, *, channels=None, exclude=None, craft=None) -> Telemetr
             channels=read.channels,
             epoch_ns=read.epoch_ns,
             dated=read.dated,
-            source=str(path),
+            source=name,
             sha256=digest,
-            inputs=(Input(str(path), digest), *inputs_of(channels)),
+            inputs=(Input(name, digest), *inputs_of(channels)),
             time_labels=read.time_labels,
             label_tai_ns=read.label_tai_ns,
             findings=tuple(read.findings),
         )
         telemetry = check_attitude(screen(telemetry, craft), read.readings)
     except BadInput as why:
-        raise why.within(path) from why.__cause__
+        raise why.within(name) from why.__cause__
     if exclude is None:
         return telemetry
     spans = read_exclusions(exclude, telemetry)
