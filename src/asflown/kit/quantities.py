@@ -123,11 +123,11 @@ def quantity(text: object, expected: str) -> float:
         if expected == "":
             return float(text)
         raise BadInput(f"{_shown(text)} has no unit", remedy=f'Write the unit in the value, as in "{text} {expected}".')
-    said = str(text)[:_LONGEST].strip()
-    match = _NUMBER.match(said)
+    written = str(text)[:_LONGEST].strip()
+    match = _NUMBER.match(written)
     if not match:
         raise BadInput(f"{_shown(text)} is not a number with a unit", remedy=f'Write it as in "1.5 {expected}".')
-    number, unit = match.group(), said[match.end() :].strip()
+    number, unit = match.group(), written[match.end() :].strip()
     if unit == "" and expected != "":
         raise BadInput(
             f"{_shown(text)} has no unit", remedy=f'Write the unit in the value, as in "{number} {expected}".'

@@ -41,7 +41,7 @@ from .channels import AXES, kind_of, split_header, to_si
 from .findings import Finding
 from .tables import Table, divided, numbers_of
 from .telemetry import Channel
-from .times import PART_UNITS, Scale, scale_called
+from .times import Scale, part_unit, scale_called
 
 if TYPE_CHECKING:
     from .text import TextFile
@@ -214,11 +214,11 @@ def _check_time(time: TimeColumn) -> None:
             f"the time format {time.format[:60]!r} is not known",
             remedy="Write one of s, ms, us, ns, min, h, d, utc, gps s, et s, unix s, unix ms, mjd, jd, or a pattern as '%d.%m.%Y %H:%M:%S'.",
         )
-    unknown = [u for u in time.units if u not in PART_UNITS]
+    unknown = [u for u in time.units if part_unit(u) is None]
     if unknown or (time.units and len(time.units) != len(time.columns)):
         raise BadInput(
             "units under [time] must give a unit of time for each of columns",
-            remedy=f"Write one of {some_of(PART_UNITS)} for each.",
+            remedy="Write s, ms, us, ns, min, h, d, week, or a multiple as '1e-9 s' for each.",
         )
     for text, unit in ((time.cadence, "s"), (time.rate, "Hz")):
         if text and not quantity(text, unit) > 0:

@@ -580,7 +580,7 @@ def _implausible(channels: dict[str, Channel], craft) -> list[Doubt]:
     for (stem, limit, whose), those in beyond.items():
         kind = next(kind_of(n) for n, _ in those)
         given = channels[those[0][0]].unit_given
-        wrong = kind.mistaken_for if kind.mistaken_for != given else ""
+        wrong = " or ".join(u for u in kind.mistaken_for.split(" or ") if u and u != given)
         guess = f": are the values {wrong} labelled {given}?" if wrong else ""
         doubts.append(
             IMPLAUSIBLE(

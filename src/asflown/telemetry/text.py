@@ -186,6 +186,8 @@ def form_of_rows(
     if not cells:
         raise BadInput("there is no header line", remedy="The first line names the columns, as in 'time [s],body_rate_x [rad/s]'.")  # fmt: skip
     width = Counter(len(c) for _, c in cells[len(cells) // 2 :]).most_common(1)[0][0]
+    if len(cells) == 2 and len(cells[1][1]) < len(cells[0][1]):
+        width = len(cells[0][1])  # of two lines, the second is the one cut short
     at = _first_row(cells, width)
     top, units = _header(cells[:at], width, comment)
     notes = [] if delimiter == "," else [f"cells are separated by {_DELIMITERS.get(delimiter, repr(delimiter))}"]
@@ -471,6 +473,6 @@ def _csv_rows(numbered: list[tuple[int, str]], delimiter: str) -> list[list[str]
         raise BadInput(
             f"this line cannot be read ({why})",
             line=numbered[min(len(rows), len(numbered) - 1)][0],
-            remedy="Quotation marks come in pairs, within one line.",
+            remedy="Close every quotation mark within its line.",
         ) from None
     return rows

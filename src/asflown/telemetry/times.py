@@ -150,8 +150,14 @@ class NotATime(Exception):
         self.row, self.why = row, why
 
 
-#: Units of columns that are added to make a time.
-PART_UNITS = (*UNITS_NS, "week")
+def part_unit(text: str) -> tuple[Decimal, str] | None:
+    """The unit of a column that is added to others to make a time, as a multiple of a unit: 'ms', 'week', '1e-9 s'; None for another."""
+    if text in UNITS_NS:
+        return Decimal(1), text
+    if text == "week":
+        return Decimal(7), "d"
+    number, _, unit = text.strip().partition(" ")
+    return (Decimal(number), unit.strip()) if unit.strip() in UNITS_NS and _DIGITS.fullmatch(number) else None
 
 
 def joined_ns(table, columns, units, factor: Decimal, scale: Scale, origin_ns: int) -> np.ndarray:
@@ -170,8 +176,11 @@ def joined_ns(table, columns, units, factor: Decimal, scale: Scale, origin_ns: i
                 ratio = Fraction(factor)
                 whole = table.instants[column].astype(object) * ratio.numerator // ratio.denominator
                 ns += whole.astype(np.int64) + int(scale.origin * UNITS_NS[scale.unit])
-            elif unit == "week":
-                ns += exact_ns(cells, Scale("", "d")) * 7
+            elif unit not in UNITS_NS:  # as "week", or "2.3283064365386963e-10 s", a fraction of 2^32
+                size, base = part_unit(unit)
+                ns += exact_ns(
+                    [format(_EXACT.multiply(_decimal(c, i), size), "f") for i, c in enumerate(cells)], Scale("", base)
+                )
             elif factor != 1:
                 ns += exact_ns(
                     [format(_EXACT.multiply(_decimal(c, i), factor), "f") for i, c in enumerate(cells)], Scale("", unit)
