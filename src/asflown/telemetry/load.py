@@ -59,7 +59,7 @@ def load_telemetry(path, *, channels=None, exclude=None, craft=None) -> Telemetr
         if of_file:
             tables, digest = _tables(path), sha256_of_file(path)
         else:
-            from .frames import digest_of, tables_of
+            from .in_memory import digest_of, tables_of
 
             tables = tables_of(path)
             digest = digest_of(tables)
