@@ -216,7 +216,7 @@ def test_python_blocks_run(file, tmp_path, monkeypatch):
     blocks = code_blocks((DOCS.parent / file).read_text(encoding="utf-8"), "python")
     if not blocks:
         pytest.skip("no Python on this page")
-    from asflown.telemetry.tables import write_table
+    from asflown.telemetry.write import write_table
     from asflown.trends.entries import history_entries
     from asflown.trends.store import TrendStore
     from flights import CASSINI, flown

@@ -16,7 +16,7 @@ _PUBLIC = {
     "built_in_crafts": "asflown.craft.load",
     "Telemetry": "asflown.telemetry.telemetry",
     "load_telemetry": "asflown.telemetry.load",
-    "write_table": "asflown.telemetry.tables",
+    "write_table": "asflown.telemetry.write",
     "torque": "asflown.estimate.torque",
     "TorqueResult": "asflown.estimate.torque",
     "torque_comparison": "asflown.estimate.torque",
@@ -177,7 +177,7 @@ if TYPE_CHECKING:
     from asflown.sim.mission import Mission, fly_mission, load_mission
     from asflown.sim.scenario import Scenario, load_scenario
     from asflown.telemetry.load import load_telemetry
-    from asflown.telemetry.tables import write_table
     from asflown.telemetry.telemetry import Telemetry
+    from asflown.telemetry.write import write_table
     from asflown.trends.entries import figure_of_merit
     from asflown.trends.store import TrendStore

@@ -10,7 +10,8 @@ import pytest
 
 from asflown.kit.timeline import gps_to_tai_ns, utc_label, utc_to_tai_ns
 from asflown.telemetry.load import load_telemetry
-from asflown.telemetry.tables import read_csv, write_table
+from asflown.telemetry.text import read_csv
+from asflown.telemetry.write import write_table
 from cli.program import T, csv_text, flight, run
 from flights import flown, saved, written
 
@@ -122,7 +123,7 @@ def test_the_time_column_may_be_utc_gps_or_seconds(good, tmp_path):
         assert np.allclose(record["torque_Nm"], base["torque_Nm"], rtol=0, atol=1e-12), name
 
 
-def test_gzip_parquet_line_ends_and_a_byte_order_mark_change_nothing(good, tmp_path):
+def test_gzip_parquet_line_ends_delimiters_and_a_byte_order_mark_change_nothing(good, tmp_path):
     base = torque(good)
     text = good.read_text()
     write_table(load_telemetry(good), tmp_path / "t.parquet")
@@ -132,6 +133,10 @@ def test_gzip_parquet_line_ends_and_a_byte_order_mark_change_nothing(good, tmp_p
         written(tmp_path, text.replace("\n", "\r"), "mac.csv"),
         written(tmp_path, "\ufeff" + text, "bom.csv"),
         written(tmp_path, text.replace("\n", ",\n").replace("UTC,", "UTC"), "commas.csv"),
+        written(tmp_path, text.replace(",", ";"), "semicolons.csv"),
+        written(tmp_path, text.replace(",", ";").replace(".", ","), "decimals.csv"),
+        written(tmp_path, text.replace(",", "\t"), "tabs.csv"),
+        written(tmp_path, text.encode("utf-16"), "wide.csv"),
         tmp_path / "t.parquet",
     ]
     for path in copies:

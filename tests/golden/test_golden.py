@@ -12,7 +12,7 @@ from asflown.cli.schemas import file_of, schemas, shipped
 from asflown.maneuvers.history import past_model
 from asflown.maneuvers.write import maneuver_text
 from asflown.sim.maneuver_sets import RCS_SET, execute
-from asflown.telemetry.tables import write_table
+from asflown.telemetry.write import write_table
 from cli.program import csv_text, flight, run
 from flights import flown
 

@@ -54,3 +54,10 @@ def test_the_radian_is_not_dropped():
 def test_a_unit_without_size_is_refused(unit):
     with pytest.raises(BadInput, match="has no size"):
         si_factor(unit, "rad/s")
+
+
+def test_law_factors_kept_at_hand_are_astropys():
+    from asflown.kit.quantities import _COMMON, parse_unit
+
+    for (text, expected), factor in _COMMON.items():
+        assert factor == pytest.approx(parse_unit(text).to(parse_unit(expected)), rel=4e-16), text

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from asflown.kit.errors import BadInput
 from asflown.kit.timeline import NS, utc_to_tai_ns
 from asflown.telemetry.load import load_telemetry
-from asflown.telemetry.tables import write_table
+from asflown.telemetry.write import write_table
 from flights import EPOCH, telemetry_of, written
 from telemetry.signals import noise
 
@@ -78,7 +78,7 @@ BAD = {
     "header only": (b"time [s],body_rate_x [rad/s]\n", "no rows"),
     "comments only": (b"# nothing\n", "no header"),
     "no time column": (b"body_rate_x [rad/s],body_rate_y [rad/s]\n1,2\n", "no time column"),
-    "unknown time scale": (b"time [h],body_rate_x [rad/s]\n1,2\n", "time scale [h]"),
+    "unknown time scale": (b"time [fortnight],body_rate_x [rad/s]\n1,2\n", "time scale [fortnight]"),
     "no unit": (b"time [s],body_rate_x\n1,2\n", "has no unit"),
     "unknown unit": (b"time [s],body_rate_x [furlong]\n1,2\n", "[furlong]"),
     "wrong unit": (b"time [s],body_rate_x [kg]\n1,2\n", "[kg]"),

@@ -18,6 +18,12 @@ def sha256_of(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
+def sha256_of_file(path: str | Path) -> str:
+    """The digest of a file's content, read in blocks."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
 def check_place(path: str | Path) -> None:
     """Raise BadInput where no file can be written; called before the work whose result it will hold.
 

@@ -19,6 +19,13 @@ def quaternion(r: Rotation) -> np.ndarray:
     return r.as_quat(scalar_first=True)
 
 
+def euler(order: str, angles_rad) -> Rotation:
+    """Three rotations (N, 3) [rad] in SciPy's order: 'ZYX' about the axes as turned before, 'zyx' about fixed ones.
+
+    'ZYX' with yaw, pitch and roll takes body vectors to those of the frame."""
+    return Rotation.from_euler(order, np.asarray(angles_rad, float))
+
+
 def attitude_error(q_commanded, q_estimated) -> np.ndarray:
     """Commanded minus estimated, a small-angle vector in body axes. [rad], shape (..., 3)
 

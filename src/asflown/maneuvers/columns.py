@@ -13,7 +13,10 @@ from ..kit.errors import BadInput, some_of
 from ..kit.quantities import numbers, quantity, si_factor
 from ..kit.timeline import utc_to_tai_ns
 from ..telemetry.channels import split_header
-from ..telemetry.tables import SCALES, Table, numbers_of, read_csv, read_parquet, times_of, words_of
+from ..telemetry.formats import read_parquet
+from ..telemetry.tables import Table, numbers_of, times_of, words_of
+from ..telemetry.text import read_csv
+from ..telemetry.times import scale_called
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -57,9 +60,11 @@ class Columns:
 
     def _check(self, name: str, unit: str | None, heading: str) -> None:
         if name == "time":
-            if (unit or "utc").lower() not in SCALES:
+            if scale_called(unit or "utc") is None:
                 raise BadInput(
-                    f"the time scale [{unit}] is not known", channel=name, remedy=f"One of: {some_of(SCALES)}."
+                    f"the time scale [{unit}] is not known",
+                    channel=name,
+                    remedy="Write one of: utc, s, gps s, et s, unix s, mjd, jd.",
                 )
         elif name in NUMBERS:
             if unit is None:
@@ -74,6 +79,14 @@ class Columns:
                 f"{heading[:60]!r} is not a column of a maneuver table", channel=name[:60] or None,
                 remedy=(f"Did you mean {some_of(near)}? " if near else "") + "docs/maneuvers.md lists the columns; 'note' is free text.",
             )  # fmt: skip
+
+    def some(self, rows: list[int]) -> Columns:
+        """The same columns with some of the rows."""
+        return (
+            self
+            if len(rows) == len(self)
+            else Columns(self.table.take(np.array(rows, np.int64), range(len(self.table.headings))))
+        )
 
     def need(self, *names: str) -> None:
         missing = [n for n in names if n not in self.at]
@@ -128,7 +141,7 @@ class Columns:
             return None
         j, unit = self.at["time"]
         origin = 0 if self.table.epoch is None else int(utc_to_tai_ns(self.table.epoch))
-        return times_of(self.table, j, unit.lower() or "utc", origin)
+        return times_of(self.table, j, scale_called(unit or "utc"), origin)
 
 
 def _factor(name: str, unit: str) -> float:

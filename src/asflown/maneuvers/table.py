@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,6 +24,10 @@ from .history import engine_called
 _ROUNDED = 2e-4
 #: A median error beyond this share of the dV is rather a wrong unit.
 _BEYOND_BELIEF = 0.3
+#: A median error below this share of the dV, of at least so many burns, is beyond any engine.
+_TOO_SMALL, _SEVERAL = 2e-5, 5
+#: A maneuver this large is rarer than a wrong unit. [m/s]
+_LARGEST_DV = 3000.0
 
 NO_MAGNITUDE_SIGMA = Kind(
     "maneuvers.no-magnitude-sigma", Severity.CAUTION,
@@ -42,6 +47,23 @@ LARGE_ERRORS = Kind(
     "maneuvers.large-errors", Severity.SUSPECT,
     "the median magnitude error is {share_percent:.0f} % of the dV: is a unit in the headings wrong?",
     "Check the units in the headings.",
+)  # fmt: skip
+ENGINE_SPELLINGS = Kind(
+    "maneuvers.engine-spellings", Severity.NOTE, "{spellings} are taken for one engine, {engine}",
+    "Write each engine's name in one way.",
+)  # fmt: skip
+REPEATED_ROWS = Kind(
+    "maneuvers.repeated-rows", Severity.SUSPECT,
+    "{count} rows have the dV, error and sigma of another row: is the table listed twice?", "Leave the copies out.",
+)  # fmt: skip
+SMALL_ERRORS = Kind(
+    "maneuvers.small-errors", Severity.SUSPECT,
+    "the median magnitude error is {share:.1g} of the dV, far below what engines reach: is a unit in the headings wrong?",
+    "Check the units in the headings.",
+)  # fmt: skip
+LARGE_DV = Kind(
+    "maneuvers.large-dv", Severity.SUSPECT,
+    "the largest dV is {largest_mps:.4g} m/s: are the values mm/s labelled m/s?", "Check the unit of the dV.",
 )  # fmt: skip
 
 
@@ -186,11 +208,16 @@ def load_maneuvers(path: str | Path) -> Maneuvers:
     path = Path(path)
     try:
         data = read_bytes(path, "maneuver table", "Give a CSV, Parquet or TOML file.")
-        columns = Columns(read_table(path, data))
-        columns.need("id")
+        whole = Columns(read_table(path, data))
+        whole.need("id")
+        ids, reasons = _ids(whole), whole.words("excluded")  # an excluded row may hold blanks or zeros
+        columns = whole.some([k for k, reason in enumerate(reasons) if not reason])
+        if len(columns) == 0:
+            raise BadInput("no maneuver is left", remedy="Leave fewer out.")
         found = _vectors(columns) if columns.has("reconstructed_dv") else _scalars(columns)
-        found = replace(found, source=str(path), inputs=(Input(str(path), sha256_of(data)),))
-        return _used(_in_order(found), columns)
+        excluded = tuple((i, reason) for i, reason in zip(ids, reasons, strict=True) if reason)
+        found = replace(found, source=str(path), inputs=(Input(str(path), sha256_of(data)),), excluded=excluded)
+        return _doubted(_one_spelling(_in_order(found)))
     except BadInput as why:
         raise why.within(path) from None
 
@@ -355,8 +382,29 @@ def _in_order(found: Maneuvers) -> Maneuvers:
     return found if found.tai_ns is None else found.take(np.argsort(found.tai_ns, kind="stable"))
 
 
-def _used(found: Maneuvers, columns: Columns) -> Maneuvers:
-    reasons = dict(zip(columns.words("id"), columns.words("excluded"), strict=True))
-    for reason in dict.fromkeys(r for r in reasons.values() if r):
-        found = found.without([i for i, r in reasons.items() if r == reason], reason)
-    return found
+def _one_spelling(found: Maneuvers) -> Maneuvers:
+    """Engines whose names differ in case, blanks and hyphens alone are one, called as most rows call it."""
+    spellings: dict[str, Counter] = {}
+    for name in found.engine:
+        spellings.setdefault(re.sub(r"[\s_-]", "", name.casefold()), Counter())[name] += 1
+    several = [names for names in spellings.values() if len(names) > 1]
+    if not several:
+        return found
+    usual = {name: names.most_common(1)[0][0] for names in spellings.values() for name in names}
+    told = [ENGINE_SPELLINGS(spellings=some_of(sorted(names)), engine=names.most_common(1)[0][0]) for names in several]
+    return replace(found, engine=tuple(usual[n] for n in found.engine), doubts=found.doubts + Doubts(told))
+
+
+def _doubted(found: Maneuvers) -> Maneuvers:
+    """With what the numbers themselves make doubtful: rows that occur twice, errors far too small for the dV."""
+    rows = Counter(
+        zip(found.dv_mps.tolist(), found.magnitude_error_mps.tolist(), found.sigma_magnitude_mps.tolist(), strict=True)
+    )
+    twice = sum(n - 1 for n in rows.values())
+    share = float(np.median(np.abs(found.magnitude_error_mps) / found.dv_mps))
+    doubts = [
+        REPEATED_ROWS(count=twice) if twice else None,
+        SMALL_ERRORS(share=share) if len(found) >= _SEVERAL and share < _TOO_SMALL else None,
+        LARGE_DV(largest_mps=float(found.dv_mps.max())) if found.dv_mps.max() > _LARGEST_DV else None,
+    ]
+    return replace(found, doubts=found.doubts + Doubts(doubts))

@@ -19,7 +19,7 @@ from ..kit.timeline import NS
 from .channels import AXES
 from .findings import ERROR_TOO_FAST, NEVER_TOGETHER, RATE_SCALE, TURNS_TOO_LITTLE
 from .frames import against_rates, commanded_doubt, readings_of
-from .telemetry import BRIDGED, Telemetry
+from .telemetry import BRIDGED, Telemetry, common_instants
 
 if TYPE_CHECKING:
     from ..kit.doubts import Doubt
@@ -63,8 +63,8 @@ def check_attitude(telemetry: Telemetry, readings: dict[str, tuple[np.ndarray, n
     declared, rate = _residual(tai_ns, q, mid_ns, w)
     odds = {}
     for name, (at_ns, other) in readings.items():
-        at = {t: i for i, t in enumerate(at_ns.tolist())}
-        residual, _ = _residual(tai_ns, other[[at[t] for t in tai_ns.tolist()]], mid_ns, w)
+        order = np.argsort(at_ns, kind="stable")
+        residual, _ = _residual(tai_ns, other[order[np.searchsorted(at_ns, tai_ns, sorter=order)]], mid_ns, w)
         odds[name] = _log_odds(residual, declared), float(np.sum(declared**2) / max(np.sum(residual**2), 1e-300))
     best = max(odds, key=lambda n: odds[n][1])
     if odds[best][0] > SIGNIFICANT and odds[best][1] > BETTER:
@@ -85,9 +85,7 @@ def check_attitude(telemetry: Telemetry, readings: dict[str, tuple[np.ndarray, n
 def together(telemetry: Telemetry, names: list[str]) -> tuple[np.ndarray, np.ndarray]:
     """Instants at which all the channels have a usable sample, (N,), and their values, (N, len(names))."""
     parts = [telemetry.channels[n].usable for n in names]
-    common = parts[0].tai_ns
-    for p in parts[1:]:
-        common = np.intersect1d(common, p.tai_ns, assume_unique=True)
+    common = common_instants(parts)
     return common, np.stack([p.values[np.searchsorted(p.tai_ns, common)] for p in parts], axis=1)
 
 

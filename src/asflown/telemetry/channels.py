@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ..kit.errors import BadInput, some_of
-from ..kit.quantities import parse_unit, si_factor
+from ..kit.quantities import is_unit, parse_unit, si_factor
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,6 @@ KINDS = (
 AXES = ("x", "y", "z")
 _MEMBERS = {"axis": AXES, "component": ("w", "x", "y", "z"), "none": ()}
 _BY_STEM = sorted(KINDS, key=lambda k: -len(k.stem))
-_HEADER = re.compile(r"^\s*([^\[\]]+?)\s*\[\s*([^\[\]]*?)\s*\]\s*$")
 
 
 def kind_of(name: str) -> ChannelKind:
@@ -97,6 +96,13 @@ def member_of(name: str) -> str:
     return name.removeprefix(kind_of(name).stem).removeprefix("_")
 
 
+def member_names(stem: str, count: int) -> tuple[str, ...]:
+    """Members of a family given as one array of ``count`` columns: its axes or components, else numbers from 1."""
+    kind = next((k for k in KINDS if k.stem == stem), None)
+    known = _MEMBERS.get(kind.member, ()) if kind else ()
+    return known if len(known) == count else tuple(str(k) for k in range(1, count + 1))
+
+
 def example_names() -> list[str]:
     """Every name, with <NAME> where a wheel, thruster or mechanism stands."""
     names = []
@@ -111,9 +117,19 @@ def example_names() -> list[str]:
 
 
 def split_header(cell: str) -> tuple[str, str] | None:
-    """'wheel_rate_RWA1 [rad/s]' -> (name, unit); None where there is no [unit]."""
-    match = _HEADER.match(cell)
-    return (match.group(1), match.group(2)) if match else None
+    """'wheel_rate_RWA1 [rad/s]' or 'rate (deg/s)' -> (name, unit); None where there is no [unit]."""
+    cell = cell.strip()
+    for first, last in ("[]", "()"):
+        if cell.endswith(last) and first in cell:
+            name, _, unit = cell[:-1].rpartition(first)
+            name, unit = name.strip(), unit.strip()
+            if (
+                name
+                and not any(mark in name + unit for mark in "[]\n")
+                and (first == "[" or is_unit(unit) or unit.lower() == "utc")
+            ):
+                return name, unit
+    return None
 
 
 def to_si(name: str, unit: str) -> tuple[float, float]:
@@ -121,8 +137,10 @@ def to_si(name: str, unit: str) -> tuple[float, float]:
     kind = kind_of(name)
     if kind.behaves == "state":
         return 1.0, 0.0
-    if kind.unit == "K" and unit in ("deg_C", "degC", "°C", "C", "celsius"):
+    if kind.unit == "K" and unit in ("deg_C", "degC", "°C", "C", "celsius", "Celsius"):
         return 1.0, 273.15
+    if kind.unit == "K" and unit in ("deg_F", "degF", "°F", "F", "fahrenheit", "Fahrenheit"):
+        return 5 / 9, 273.15 - 32 * 5 / 9
     try:
         if unit != "":
             parse_unit(unit)  # first: "unknown unit" is a clearer message than "wrong kind of unit"

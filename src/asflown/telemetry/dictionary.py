@@ -2,12 +2,16 @@
 
 A dictionary is TOML; unknown keys are refused, and columns it does not mention are ignored.
 
-    [time]                       column, format ("s", "utc", "gps s", "et s", "unix s"), epoch (UTC, for "s"),
-                                 labels = [further time columns, kept as written]
+    [time]                       column, or columns (added, each in its unit of ``units``, or joined with a blank), or rate = "4 Hz"
+                                 where there is none; format ("s", "ms", "utc", "gps s", "et s", "unix s", "mjd", "jd", or a strptime
+                                 pattern), scale, epoch (UTC, for elapsed times), cadence = "0.25 s" where stamps are coarser than
+                                 the samples, labels = [further time columns, kept as written]
     [[channel]]                  column, name, unit; scale and offset: value = (cell * scale + offset) [unit];
                                  count = "0.4 rpm": the size of one count (with unit = "count" cells are counts);
-                                 wrap = "65536 count" or "360 deg": the modulus at which cells wrap
-    [quaternion]                 columns (4), order, handedness, direction, frame
+                                 wrap = "65536 count" or "360 deg": the modulus at which cells wrap;
+                                 fill = [-9999]: cells that mean 'no value'; valid = ["-6000 rpm", "6000 rpm"]: the range of measurements
+    [quaternion]                 columns (4), order, handedness, direction, frame, scale
+    [euler]                      columns (3), order ("ZYX": intrinsic, "zyx": extrinsic), unit, direction, frame
     [orbit]                      position (3 columns), position_unit, velocity (3 columns), velocity_unit
     [long]                       channel, value (columns); the [[channel]] columns are then names in the first
     [notes]                      free text
@@ -21,21 +25,26 @@ the orbit normal, x along the velocity), whose turning with the orbit is then re
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from decimal import Decimal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from ..kit.config import read_bytes, toml_table, validated
 from ..kit.errors import BadInput, some_of
-from ..kit.quantities import quantity
-from ..kit.rotations import lvlh_to_inertial, quaternion, rotation
+from ..kit.quantities import is_unit, quantity, si_factor
+from ..kit.rotations import euler, lvlh_to_inertial, quaternion, rotation
 from ..kit.timeline import NS
-from .assemble import Read, Use, assembled
+from .assemble import Clock, Part, Read, Use, assembled
 from .channels import AXES, kind_of, split_header, to_si
 from .findings import Finding
 from .tables import Table, divided, numbers_of
 from .telemetry import Channel
+from .times import Scale, part_unit, scale_called
+
+if TYPE_CHECKING:
+    from .text import TextFile
 
 
 class _Part(BaseModel):
@@ -43,10 +52,32 @@ class _Part(BaseModel):
 
 
 class TimeColumn(_Part):
-    column: str
-    format: Literal["s", "utc", "gps s", "et s", "unix s"] = "s"
+    column: str | None = None
+    columns: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    rate: str = ""
+    format: str = "s"
+    scale: float = Field(1.0, gt=0, allow_inf_nan=False)
     epoch: str | None = None
+    cadence: str = ""
     labels: tuple[str, ...] = ()
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Its columns."""
+        return self.columns or (() if self.column is None else (self.column,))
+
+    def clock(self, at: dict[str, int]) -> Clock:
+        """How the times of a table are written, whose columns stand where ``at`` says."""
+        scale = scale_called(self.format) or Scale("")
+        return Clock(
+            tuple(at[c] for c in self.named),
+            scale,
+            self.units,
+            Decimal(repr(self.scale)) if self.scale != 1 else Decimal(1),
+            round(quantity(self.cadence, "s") * NS) if self.cadence else 0,
+            quantity(self.rate, "Hz") if self.rate else 0.0,
+        )
 
 
 class ChannelEntry(_Part):
@@ -57,6 +88,8 @@ class ChannelEntry(_Part):
     offset: float = Field(0.0, allow_inf_nan=False)
     count: str = ""
     wrap: str = ""
+    fill: tuple[float, ...] = ()
+    valid: tuple[str, ...] = Field((), max_length=2)
     note: str = ""
 
 
@@ -70,14 +103,33 @@ class QuaternionEntry(_Part):
     handedness: Literal["hamilton", "jpl"] = "hamilton"
     direction: Literal["body-to-frame", "frame-to-body"]
     frame: Literal["inertial", "lvlh"] = "inertial"
+    scale: float = Field(1.0, gt=0, allow_inf_nan=False)
 
     def house(self, q: np.ndarray, *, turned: bool = False, reordered: bool = False) -> np.ndarray:
         """Columns as written, (N, 4), to scalar-first Hamilton, body to frame; or under another reading."""
+        q = q * self.scale
         last = (self.order == "scalar-last") != reordered
         q = np.roll(q, 1, axis=1) if last else q
         # JPL's matrix is the transpose of Hamilton's: it undoes one reversal
         conjugate = (self.direction == "frame-to-body") != (self.handedness == "jpl")
         return q * (np.array([1, -1, -1, -1]) if conjugate != turned else 1)
+
+
+class EulerEntry(_Part):
+    """Attitude as three rotations about axes, in the order written; capitals: each about the axes as turned before."""
+
+    columns: _Columns3
+    order: Annotated[str, Field(pattern=r"^(?:[XYZ]{3}|[xyz]{3})$")]
+    unit: str
+    direction: Literal["body-to-frame", "frame-to-body"]
+    frame: Literal["inertial", "lvlh"] = "inertial"
+    scale: float = 1.0
+
+    def house(self, angles: np.ndarray, *, turned: bool = False, reordered: bool = False) -> np.ndarray:
+        """Angles as written, (N, 3), to scalar-first Hamilton quaternions, body to frame; or under another reading."""
+        order = self.order.swapcase() if reordered else self.order
+        q = quaternion(euler(order, angles * si_factor(self.unit, "rad")))
+        return q * (np.array([1, -1, -1, -1]) if (self.direction == "frame-to-body") != turned else 1)
 
 
 class OrbitEntry(_Part):
@@ -98,16 +150,24 @@ class ChannelDictionary(_Part):
     time: TimeColumn
     channel: tuple[ChannelEntry, ...] = ()
     quaternion: QuaternionEntry | None = None
+    euler: EulerEntry | None = None
     orbit: OrbitEntry | None = None
     long: LongEntry | None = None
     notes: dict[str, str] = Field(default_factory=dict)
 
+    @property
+    def attitude(self) -> QuaternionEntry | EulerEntry | None:
+        return self.quaternion or self.euler
+
 
 def load_dictionary(path) -> ChannelDictionary:
-    """Read and check a dictionary.  Raises BadInput for a missing file, an unknown key, name or unit."""
-    source = read_bytes(path, "channel dictionary", "Give a TOML file; examples/ holds some.")
+    """Read and check a dictionary, from a file or a dict of its keys.  Raises BadInput for a missing file, an unknown key, name or unit."""
     remedy = "docs/telemetry.md lists the keys of a channel dictionary."
-    entry = validated(ChannelDictionary, toml_table(source, path), path, remedy)
+    if isinstance(path, dict):
+        entry, path = validated(ChannelDictionary, path, "channels", remedy), "channels"
+    else:
+        source = read_bytes(path, "channel dictionary", "Give a TOML file; examples/ holds some.")
+        entry = validated(ChannelDictionary, toml_table(source, path), path, remedy)
     try:
         _check(entry)
     except BadInput as why:
@@ -119,8 +179,11 @@ def _check(entry: ChannelDictionary) -> None:
     """Checks beyond the types: names, units, and nothing mapped twice."""
     columns = [c.column for c in entry.channel]
     names = [c.name for c in entry.channel]
-    if entry.quaternion:
-        columns += entry.quaternion.columns
+    _check_time(entry.time)
+    if entry.quaternion and entry.euler:
+        raise BadInput("the attitude is mapped twice, in [quaternion] and [euler]", remedy="Map it once.")
+    if entry.attitude:
+        columns += entry.attitude.columns
         names += [f"quaternion_{m}" for m in "wxyz"]
     if entry.orbit:
         columns += [*entry.orbit.position, *entry.orbit.velocity]
@@ -131,10 +194,35 @@ def _check(entry: ChannelDictionary) -> None:
         twice = sorted({t for t in those if those.count(t) > 1})
         if twice:
             raise BadInput(f"a {what} is mapped twice: {some_of(twice)}", remedy="Map it once.")
-    if entry.quaternion and entry.quaternion.frame == "lvlh" and entry.orbit is None:
-        raise BadInput("a quaternion in LVLH needs the orbit", remedy="Add [orbit] with position and velocity columns.")
+    if entry.euler:
+        si_factor(entry.euler.unit, "rad")
+    if entry.attitude and entry.attitude.frame == "lvlh" and entry.orbit is None:
+        raise BadInput("an attitude in LVLH needs the orbit", remedy="Add [orbit] with position and velocity columns.")
     for use in _uses(entry, {c: 0 for c in columns}):
         to_si(use.name, use.unit)
+
+
+def _check_time(time: TimeColumn) -> None:
+    """One way of telling the time, in a known form."""
+    if sum((time.column is not None, bool(time.columns), bool(time.rate))) != 1:
+        raise BadInput(
+            "[time] needs one of column, columns and rate",
+            remedy='Write column = "T", columns = ["WEEK", "TOW"], or rate = "4 Hz" where the file has no times.',
+        )
+    if scale_called(time.format) is None:
+        raise BadInput(
+            f"the time format {time.format[:60]!r} is not known",
+            remedy="Write one of s, ms, us, ns, min, h, d, utc, gps s, et s, unix s, unix ms, mjd, jd, or a pattern as '%d.%m.%Y %H:%M:%S'.",
+        )
+    unknown = [u for u in time.units if part_unit(u) is None]
+    if unknown or (time.units and len(time.units) != len(time.columns)):
+        raise BadInput(
+            "units under [time] must give a unit of time for each of columns",
+            remedy="Write s, ms, us, ns, min, h, d, week, or a multiple as '1e-9 s' for each.",
+        )
+    for text, unit in ((time.cadence, "s"), (time.rate, "Hz")):
+        if text and not quantity(text, unit) > 0:
+            raise BadInput(f"{text!r} under [time] must be positive", remedy=f'Write it as in "0.25 {unit}".')
 
 
 def _uses(entry: ChannelDictionary, at: dict[str, int]) -> list[Use]:
@@ -167,7 +255,7 @@ def _uses(entry: ChannelDictionary, at: dict[str, int]) -> list[Use]:
                     channel=c.name,
                     remedy='Write wrap = "65536 count" or "360 deg".',
                 )
-        uses.append(Use(at[c.column], c.name, unit, scale, offset, size, wrap))
+        uses.append(Use(at[c.column], c.name, unit, scale, offset, size, wrap, c.fill, _range(c, si)))
     if entry.orbit:
         for stem, columns, unit in (
             ("orbit_position", entry.orbit.position, entry.orbit.position_unit),
@@ -177,12 +265,25 @@ def _uses(entry: ChannelDictionary, at: dict[str, int]) -> list[Use]:
     return uses
 
 
-def translated(tables: list[Table], entry: ChannelDictionary) -> Read:
+def _range(entry: ChannelEntry, si: str) -> tuple[float, float] | None:
+    """The range of measurements, SI."""
+    if not entry.valid:
+        return None
+    if len(entry.valid) == 2:
+        low, high = (quantity(text, si) for text in entry.valid)
+        if low < high:
+            return low, high
+    raise BadInput(
+        "valid needs two values, the lower first", channel=entry.name, remedy='Write valid = ["-6000 rpm", "6000 rpm"].'
+    )
+
+
+def translated(tables: list[Table] | list[TextFile], entry: ChannelDictionary) -> Read:
     """The tables' columns as channels in house names, units and conventions.
 
     Raises BadInput for a column of the dictionary that no table has."""
     if entry.long:
-        tables = [part for t in tables for part in _divided(t, entry.time, entry.long)]
+        tables = [part for t in tables for part in _divided(t.whole(), entry.time, entry.long)]
     missing = _wanted(entry) - {n for t in tables for n in _columns_of(t)}
     if missing:
         there = dict.fromkeys(h for t in tables for h in t.headings)
@@ -190,35 +291,68 @@ def translated(tables: list[Table], entry: ChannelDictionary) -> Read:
             f"columns of the dictionary are not in the file: {some_of(sorted(missing))}",
             remedy=f"The file's columns: {some_of(there)}.",
         )
-    parts, ignored = [], []
+    parts: list[Part] = []
+    ignored: list[str] = []
     for table in tables:
         at = _columns_of(table)
-        if entry.time.column not in at:
+        if not all(c in at for c in entry.time.named):
             continue
-        uses = _uses(entry, at)
         clocks = [at[c] for c in entry.time.labels if c in at]
-        parts.append((table, at[entry.time.column], entry.time.format, uses, clocks))
-        known = _wanted(entry) | {entry.time.column}
+        attitude = [at[c] for c in entry.attitude.columns if c in at] if entry.attitude else []
+        parts.append(Part(table, entry.time.clock(at), _uses(entry, at), clocks).parsed(attitude))
+        known = _wanted(entry)
         ignored += [h for h in table.headings if not {h, _bare(h)} & known]
-    read = assembled(parts, entry.time.epoch if entry.time.format == "s" else None)
-    if entry.quaternion:
-        _add_quaternion(read, parts, entry.quaternion)
+    elapsed = all(not p.clock.scale.dated for p in parts)
+    read = assembled(parts, entry.time.epoch if elapsed else None, alone=entry.attitude is None)
+    if entry.attitude:
+        _add_attitude(read, parts, entry.attitude)
+    read.findings += [f for t in tables for f in _contradicted(t, entry, read.epoch_ns)]
     if ignored:
         detail = f"columns the dictionary does not mention: {some_of(dict.fromkeys(ignored))}"
         read.findings.append(Finding("", "ignored", len(set(ignored)), read.epoch_ns, detail))
     return read
 
 
+def _contradicted(table: Table | TextFile, entry: ChannelDictionary, epoch_ns: int) -> list[Finding]:
+    """Columns whose heading names another unit than the dictionary, which scales them by nothing else."""
+    said = {name: unit for h in table.headings for name, unit in [split_header(h) or (h, None)] if unit is not None}
+    headed = {h: (split_header(h) or (h, None))[1] for h in table.headings} | said
+    found = []
+    for c in entry.channel:
+        unit = headed.get(c.column)
+        if unit and c.scale == 1 and c.offset == 0 and not c.count and is_unit(unit) and _differ(c.name, unit, c.unit):
+            detail = f"the heading of {c.column!r} says [{unit}], the channel dictionary [{c.unit}]; the dictionary was followed"
+            found.append(Finding(c.name, "unit", 1, epoch_ns, detail))
+    time, scale = entry.time, scale_called(entry.time.format)
+    heading = scale_called(headed.get(time.column or "") or "")
+    if (
+        scale is not None
+        and heading is not None
+        and time.scale == 1
+        and (heading.unit != scale.unit or (heading.dated and heading != scale))
+    ):
+        detail = f"the heading of {time.column!r} says [{headed[time.column]}], the channel dictionary {time.format!r}; the dictionary was followed"
+        found.append(Finding("", "unit", 1, epoch_ns, detail))
+    return found
+
+
+def _differ(name: str, one: str, other: str) -> bool:
+    try:
+        return to_si(name, one) != to_si(name, other)
+    except BadInput:
+        return True
+
+
 def _wanted(entry: ChannelDictionary) -> set[str]:
-    wanted = {c.column for c in entry.channel} | {entry.time.column, *entry.time.labels}
-    if entry.quaternion:
-        wanted |= set(entry.quaternion.columns)
+    wanted = {c.column for c in entry.channel} | {*entry.time.named, *entry.time.labels}
+    if entry.attitude:
+        wanted |= set(entry.attitude.columns)
     if entry.orbit:
         wanted |= {*entry.orbit.position, *entry.orbit.velocity}
     return wanted
 
 
-def _columns_of(table: Table) -> dict[str, int]:
+def _columns_of(table: Table | TextFile) -> dict[str, int]:
     """Where each column stands, by its heading as written or without its unit."""
     bare = {_bare(h): j for j, h in enumerate(table.headings)}
     return bare | {h: j for j, h in enumerate(table.headings)}
@@ -230,21 +364,23 @@ def _bare(heading: str) -> str:
 
 def _divided(table: Table, time: TimeColumn, long: LongEntry) -> list[Table]:
     at = _columns_of(table)
-    absent = [c for c in (time.column, long.channel, long.value) if c not in at]
+    if len(time.named) != 1:
+        raise BadInput("a long table needs one time column", remedy="Give column under [time].")
+    absent = [c for c in (time.named[0], long.channel, long.value) if c not in at]
     if absent:
         raise BadInput(
             f"columns of the dictionary are not in the file: {some_of(absent)}",
             remedy=f"The file's columns: {some_of(table.headings)}.",
         )
-    return divided(table, at[time.column], at[long.channel], at[long.value], None)
+    return divided(table, at[time.named[0]], at[long.channel], at[long.value], None)
 
 
-# ---- the quaternion -------------------------------------------------------------------------------
+# ---- the attitude -------------------------------------------------------------------------------
 
 
-def _add_quaternion(read: Read, parts, said: QuaternionEntry) -> None:
-    """The quaternion in house convention, and what it would be under the other readings (for ``attitude``)."""
-    tai_ns, q = _raw_quaternion(read, parts, said.columns)
+def _add_attitude(read: Read, parts: list[Part], said: QuaternionEntry | EulerEntry) -> None:
+    """The attitude in house convention, and what it would be under the other readings (for ``attitude``)."""
+    tai_ns, q = _raw(read, parts, said)
     frame = None
     if said.frame == "lvlh":
         known, frame = _frame_at(read.channels, tai_ns)
@@ -267,13 +403,16 @@ def _add_quaternion(read: Read, parts, said: QuaternionEntry) -> None:
 
     def inertial(**other):
         house = said.house(q, **other)
-        return house if frame is None else quaternion(frame * rotation(house)) * np.linalg.norm(q, axis=1)[:, None]
+        return house if frame is None else quaternion(frame * rotation(house)) * np.linalg.norm(house, axis=1)[:, None]
 
     house = inertial()
     for j, m in enumerate("wxyz"):
         read.channels[f"quaternion_{m}"] = Channel(f"quaternion_{m}", tai_ns, house[:, j], np.ones(len(q), bool))
     other_way = "frame-to-body" if said.direction == "body-to-frame" else "body-to-frame"
-    other_order = "scalar-last" if said.order == "scalar-first" else "scalar-first"
+    if isinstance(said, EulerEntry):
+        other_order = said.order.swapcase()
+    else:
+        other_order = "scalar-last" if said.order == "scalar-first" else "scalar-first"
     read.readings = {
         f'direction = "{other_way}"': (tai_ns, inertial(turned=True)),
         f'order = "{other_order}"': (tai_ns, inertial(reordered=True)),
@@ -281,10 +420,11 @@ def _add_quaternion(read: Read, parts, said: QuaternionEntry) -> None:
     }
 
 
-def _raw_quaternion(read: Read, parts, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Instants at which all four columns were sampled, and their numbers as written."""
-    found = {}
-    for (table, *_), tai_ns in zip(parts, read.row_times_ns, strict=True):
+def _raw(read: Read, parts: list[Part], said: QuaternionEntry | EulerEntry) -> tuple[np.ndarray, np.ndarray]:
+    """Instants at which all its columns were sampled, and their numbers as written."""
+    names, found = said.columns, {}
+    for part, tai_ns in zip(parts, read.row_times_ns, strict=True):
+        table = part.table.whole()
         at = _columns_of(table)
         for c in names:
             if c not in at:
@@ -296,14 +436,20 @@ def _raw_quaternion(read: Read, parts, names: tuple[str, ...]) -> tuple[np.ndarr
     for t, _ in columns[1:]:
         common = np.intersect1d(common, t)
     if len(common) == 0:
-        raise BadInput("the four columns have no common sample", channel="quaternion", remedy="Check [quaternion].")
+        raise BadInput(
+            "the columns of the attitude have no common sample",
+            channel="quaternion",
+            remedy="Check [quaternion] or [euler].",
+        )
     # file order is kept, so that disorder and duplicates are seen by the screening
     kept = [(t[np.isin(t, common)], v[np.isin(t, common)]) for t, v in columns]
     if any(len(t) != len(kept[0][0]) or (t != kept[0][0]).any() for t, _ in kept):
         once = [np.unique(t, return_index=True) for t, _ in kept]
         return once[0][0], np.stack([v[i] for (_, i), (_, v) in zip(once, kept, strict=True)], axis=1)
     q = np.stack([v for _, v in kept], axis=1)
-    whole = np.linalg.norm(q, axis=1) > 0.5  # a quaternion of zeros is an unfilled packet
+    if isinstance(said, EulerEntry):
+        return kept[0][0], q
+    whole = np.linalg.norm(q, axis=1) * said.scale > 0.5  # a quaternion of zeros is an unfilled packet
     if not whole.all():
         first = int(kept[0][0][~whole][0])
         read.findings.append(

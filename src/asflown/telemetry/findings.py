@@ -16,7 +16,7 @@ class Finding:
     """One kind of fault found in a channel ('' for the whole file): how often, and where first."""
 
     channel: str
-    what: str  # duplicate, conflict, disorder, repeat, spike, stuck, still, wrap, fall, norm, nan, gap, dropout, orbit, ignored, excluded
+    what: str  # duplicate, conflict, disorder, repeat, spike, stuck, still, wrap, fall, norm, nan, gap, dropout, orbit, ignored, excluded, fill, declared, stray, form
     count: int
     first_tai_ns: int
     detail: str
@@ -71,15 +71,26 @@ NOT_UNIT = Kind(
 )  # fmt: skip
 
 #: Finding -> its doubt.  Findings not listed here do no harm: samples that are missing (gap, dropout),
-#: excluded by the user (excluded), or not requested (ignored).
+#: excluded by the user (excluded) or not requested (ignored), declared fill values (declared), how the file was read (form).
 OF_FINDING = {
     "duplicate": Kind("telemetry.duplicates", Severity.NOTE,
-                      "{count} time stamps occur twice with the same values{where}; the first sample is used", _CHECK),
+                      "{count} samples are copies of others with the same time stamp{where}; they were left out", _CHECK),
     "conflict": Kind("telemetry.conflicts", Severity.SUSPECT,
-                     "{count} time stamps occur twice with different values{where}; the first sample is used", _CHECK),
+                     "{count} samples have the time stamp of another sample and other values{where}; they were left out",
+                     "Give time stamps with more digits, or the cadence under [time] of a channel dictionary."),
     "disorder": Kind("telemetry.disorder", Severity.CAUTION, "{count} late samples{where} were sorted by time", _CHECK),
     "repeat": Kind("telemetry.repeats", Severity.CAUTION,
                    "{count} samples repeat the previous value bit for bit{where}: stale frames", _CHECK),
+    "fill": Kind("telemetry.fill", Severity.CAUTION,
+                 "{count} samples hold fill values or come from unfilled packets{where}; they were left out",
+                 "Declare fill values in a channel dictionary (fill = [...])."),
+    "stray": Kind("telemetry.strays", Severity.CAUTION,
+                  "{count} samples are stamped far off those beside them in the file{where}; they were left out", _CHECK),
+    "saturated": Kind("telemetry.saturated", Severity.SUSPECT,
+                      "{count} samples hold the channel's extreme value{where}: a sensor at the end of its range? They were left out", _CHECK),
+    "unit": Kind("telemetry.unit-contradiction", Severity.SUSPECT,
+                 "the headings of {count} columns name another unit than the channel dictionary{where}; the dictionary was followed",
+                 "Correct the unit in the channel dictionary, or the heading."),
     "spike": Kind("telemetry.spikes", Severity.CAUTION, "{count} spikes were left out{where}", _CHECK),
     "stuck": Kind("telemetry.stuck", Severity.CAUTION,
                   "a noisy sensor repeats one value for {count} samples{where}; they were left out", _CHECK),

@@ -6,28 +6,32 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..kit.errors import BadInput, some_of
-from ..kit.files import sha256_of
+from ..kit.files import sha256_of_file
 from ..kit.result import Input, inputs_of
-from .assemble import _TIME_UNITS, Read, Use, assembled, time_scale
+from .assemble import Clock, Part, Read, Use, assembled, time_scale
 from .channels import kind_of, split_header, to_si
-from .tables import Table, divided, long_columns, read_csv, read_netcdf, read_parquet
+from .formats import BY_SIGNATURE
+from .tables import Table, divided, long_columns
 from .telemetry import Exclusion, Telemetry
+from .text import TextFile, read_csv, read_text
+from .times import scale_called
 
 #: Headings of further time columns, kept as written; so is any column in a time scale.
 CLOCKS = ("sclk", "ert", "ground_receipt", "scet", "utc", "time")
 
 
 def load_telemetry(path, *, channels=None, exclude=None, craft=None) -> Telemetry:
-    """Read one telemetry file, screen it, and return its channels in SI.
+    """Read one telemetry file or table in memory, screen it, and return its channels in SI.
 
     Nothing is resampled.  Samples that must not be used are marked, not removed.
 
     Parameters
     ----------
-    path : str or Path
-        CSV (plain or gzip), Parquet, NetCDF or HDF5.
-    channels : str or Path, optional
-        Channel dictionary (TOML), where the table does not describe itself; docs/telemetry.md lists its keys.
+    path : str or Path, or table
+        A text table (plain or gzip), Parquet, NetCDF, HDF5, FITS, CDF, MATLAB or Excel; or a
+        pandas or polars DataFrame, an xarray Dataset, or a dict of arrays (name -> values, or name -> (values, unit)).
+    channels : str, Path or dict, optional
+        Channel dictionary (TOML, or a dict of the same keys), where the table does not describe itself; docs/telemetry.md lists its keys.
     exclude : str or Path, optional
         CSV of spans not to be used, with columns start, stop, channel, reason; start and stop in seconds from the
         epoch or in UTC, '*' for all channels.
@@ -48,10 +52,17 @@ def load_telemetry(path, *, channels=None, exclude=None, craft=None) -> Telemetr
     from .attitude import check_attitude
     from .screening import screen
 
-    path = Path(path)
+    of_file = isinstance(path, (str, Path))
+    path = Path(path) if of_file else path
+    name = str(path) if of_file else type(path).__name__
     try:
-        data = _bytes(path)
-        tables = _tables(path, data)
+        if of_file:
+            tables, digest = _tables(path), sha256_of_file(path)
+        else:
+            from .in_memory import digest_of, tables_of
+
+            tables = tables_of(path)
+            digest = digest_of(tables)
         if channels is None:
             read = _self_described(tables)
         else:
@@ -62,16 +73,16 @@ def load_telemetry(path, *, channels=None, exclude=None, craft=None) -> Telemetr
             channels=read.channels,
             epoch_ns=read.epoch_ns,
             dated=read.dated,
-            source=str(path),
-            sha256=sha256_of(data),
-            inputs=(Input(str(path), sha256_of(data)), *inputs_of(channels)),
+            source=name,
+            sha256=digest,
+            inputs=(Input(name, digest), *inputs_of(channels)),
             time_labels=read.time_labels,
             label_tai_ns=read.label_tai_ns,
             findings=tuple(read.findings),
         )
         telemetry = check_attitude(screen(telemetry, craft), read.readings)
     except BadInput as why:
-        raise why.within(path) from why.__cause__
+        raise why.within(name) from why.__cause__
     if exclude is None:
         return telemetry
     spans = read_exclusions(exclude, telemetry)
@@ -81,50 +92,55 @@ def load_telemetry(path, *, channels=None, exclude=None, craft=None) -> Telemetr
         raise why.within(exclude) from None
 
 
-def _bytes(path: Path) -> bytes:
+def _check_plain(path: Path) -> None:
+    """Raise BadInput where there is no plain file with content."""
     try:
-        data = path.read_bytes()
-    except IsADirectoryError:
-        raise BadInput("this is a directory, not a file", remedy="Give one file.") from None
-    except FileNotFoundError:
-        raise BadInput("there is no such file", remedy="Check the path.") from None
+        if path.is_dir():
+            raise BadInput("this is a directory, not a file", remedy="Give one file.")
+        if not path.exists():
+            raise BadInput("there is no such file", remedy="Check the path.")
+        if not path.is_file():
+            raise BadInput("this is not a plain file", remedy="Write the table to a file first.")
+        if path.stat().st_size == 0:
+            raise BadInput("the file is empty", remedy="Give a table with a header line and at least one row.")
+        with path.open("rb"):
+            pass
     except (OSError, ValueError) as why:
         raise BadInput(f"the file cannot be opened ({getattr(why, 'strerror', None) or why})", remedy="Check the path and its permissions.") from None  # fmt: skip
-    if not data:
-        raise BadInput("the file is empty", remedy="Give a table with a header line and at least one row.")
-    return data
 
 
-def _tables(path: Path, data: bytes) -> list[Table]:
+def _tables(path: Path) -> list[Table] | list[TextFile]:
     """The tables of a file, whose format its first bytes give; the suffix is only checked against it."""
-    if data[:4] == b"PAR1":
-        return [read_parquet(path)]
-    if data[:8] == b"\x89HDF\r\n\x1a\n" or data[:3] == b"CDF":
-        return read_netcdf(path)
-    if path.suffix in (".parquet", ".nc", ".h5", ".hdf5", ".hdf"):
+    _check_plain(path)
+    with path.open("rb") as file:
+        first = file.read(32)
+    for signature, read in BY_SIGNATURE:
+        if first.startswith(signature):
+            return read(path)
+    if path.suffix.lower() in (".parquet", ".nc", ".h5", ".hdf5", ".hdf", ".fits", ".fit", ".cdf", ".mat", ".xlsx"):
         raise BadInput(
             f"the content is not {path.suffix}, as the file name says",
             remedy="Copy the file again, or correct its suffix.",
         )
-    return [read_csv(data)]
+    return [read_text(path)]
 
 
-def _self_described(tables: list[Table]) -> Read:
+def _self_described(tables: list[Table] | list[TextFile]) -> Read:
     """Channels from headings 'name [unit]' under a first column 'time [..]'."""
-    parts: list[Table] = []
+    whole: list[Table | TextFile] = []
     for table in tables:
         time_scale(table)
         where = long_columns(table.headings)
-        parts += divided(table, 0, *where) if where else [table]
-    return assembled([(part, 0, time_scale(part), *_headed(part)) for part in parts], None)
+        whole += divided(table.whole(), 0, *where) if where else [table]
+    return assembled([Part(t, Clock((0,), time_scale(t)), *_headed(t)).parsed() for t in whole], None)
 
 
-def _headed(table: Table) -> tuple[list[Use], list[int]]:
+def _headed(table: Table | TextFile) -> tuple[list[Use], list[int]]:
     """What each heading after the first names: a channel, or a further clock to keep."""
     uses, clocks = [], []
     for j, heading in enumerate(table.headings[1:], 1):
         name, unit = split_header(heading) or (heading.strip(), None)
-        if name.lower() in CLOCKS or (unit is not None and unit.lower() in _TIME_UNITS):
+        if name.lower() in CLOCKS or (unit is not None and _is_clock(unit)):
             clocks.append(j)
             continue
         if not name:
@@ -140,6 +156,11 @@ def _headed(table: Table) -> tuple[list[Use], list[int]]:
     return uses, clocks
 
 
+def _is_clock(unit: str) -> bool:
+    scale = scale_called(unit)
+    return scale is not None and scale.dated
+
+
 def _is_state(name: str) -> bool:
     try:
         return kind_of(name).behaves == "state"
@@ -153,7 +174,8 @@ def read_exclusions(path, telemetry: Telemetry) -> list[Exclusion]:
     Raises BadInput for a missing column, a span that ends before it starts, or one without a reason."""
     path = Path(path)
     try:
-        table = read_csv(_bytes(path))
+        _check_plain(path)
+        table = read_csv(path.read_bytes())
         names = [h.strip().lower() for h in table.headings]
         missing = [n for n in ("start", "stop", "channel", "reason") if n not in names]
         if missing:

@@ -6,20 +6,22 @@ quantisation would produce, and reports only what they do not explain.
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import median_filter
 from scipy.special import pdtrc
 
-from ..kit.errors import BadInput
 from ..kit.scatter import MEDIAN_SIZE, difference_sigma
 from ..kit.timeline import NS, segments
 from .channels import AXES, kind_of
 from .findings import ERROR_TOO_FAST, IMPLAUSIBLE, NOT_UNIT, RATE_SCALE, Finding
-from .telemetry import BRIDGED, Channel, Telemetry
+from .order import in_order
+from .telemetry import BRIDGED, Channel, Telemetry, common_instants
 
 if TYPE_CHECKING:
     from ..kit.doubts import Doubt
@@ -27,7 +29,15 @@ if TYPE_CHECKING:
 SPIKE_SIGMAS = 20.0  # far beyond noise; kicks of a sticking wheel reach 10 on their own channel
 AGREE = 0.2  # a spike's neighbours differ among themselves by less than this part of its height
 STUCK_RUN = 10  # samples; shorter runs of one value are repeats
-LATE_FEW, LATE_PART = 3, 0.01  # up to this many late samples count as disorder, more as a clock running backwards
+_FEW = 0.01  # share of the samples: fewer beyond a limit are outliers, more are a wrong unit
+_OVER_LIMIT = 1.05  # times a wheel's rate limit
+_FEWEST = 7  # samples that a channel needs to be judged
+_FAR, _NEAR = (
+    10.0,
+    1.0,
+)  # ranges of all other samples that a fill value lies away; one of the usual fill values may be nearer
+_PLATEAU = 3  # samples at the end of the range
+_FINE = 10.0  # quantisation steps of a typical change, from which a channel seldom repeats by chance
 CHANCE = 1e-6  # significance: an event less probable than this is not due to noise and quantisation
 
 #: Quantities whose noise never repeats bit for bit: a repeated value is stale.
@@ -37,11 +47,19 @@ _MEASURED = frozenset({
 })  # fmt: skip
 
 _NOT_UNIT = 0.1  # by which a unit vector's length may be off
+#: Quantities with a sign: a wrapped value stands for the turn nearest zero.
+_SIGNED = frozenset({"wheel_rate", "body_rate", "attitude_error", "rate_error", "control_torque", "wheel_torque"})
+
+#: Usual fill values; of 16 and 32 bits, of spreadsheets, and of NetCDF and CDF.
+_FILL_VALUES = frozenset(np.float32(v) for v in (
+    999, 9999, 99999, 999999, 9999.9, 99999.9, 32767, 32768, 65535, 2147483647, 2147483648, 4294967295, 1e20, 1e30, 1e31, 9.969209968386869e36,
+))  # fmt: skip
+
 #: Doubts that a unit is not the one written.
 _OF_UNITS = (IMPLAUSIBLE, ERROR_TOO_FAST, RATE_SCALE)
 
 #: Findings that need inspection before the data are used (exit code 3 of `telemetry check`).
-SERIOUS = frozenset({"conflict", "spike", "stuck", "norm", "fall"})
+SERIOUS = frozenset({"conflict", "spike", "stuck", "norm", "fall", "fill", "stray", "saturated", "unit"})
 
 
 def screen(telemetry: Telemetry, craft=None) -> Telemetry:
@@ -49,19 +67,21 @@ def screen(telemetry: Telemetry, craft=None) -> Telemetry:
 
     ``craft`` serves only to test wheel rates against its rate limits (rpm labelled rad/s).
     Raises BadInput where time runs backwards for more than a few samples."""
-    channels, findings = _in_order(telemetry)
-    for name, c in list(channels.items()):
-        if c.kind.behaves == "state":
-            findings += _pauses(c)
-            continue
-        for test in (_unwrapped, _without_spikes, _without_stuck, _without_repeats):
-            c, found = test(c)
-            findings += found
-        findings += _falls(c) + _pauses(c)
-        channels[name] = c
-    for look in (_without_repeated_frames, _whole_quaternions):
+    channels, findings = in_order(telemetry)
+    for look in (_of_one_sign, _without_unfilled):
         channels, found = look(channels)
         findings += found
+    with ThreadPoolExecutor(
+        min(len(channels), os.cpu_count() or 1) or 1
+    ) as pool:  # sorting and differencing run beside each other
+        screened = list(pool.map(partial(_screened, craft=craft), channels.values()))
+    steps = {c.name: step for c, step, _ in screened if c.kind.behaves != "state"}
+    channels = {c.name: c for c, _, _ in screened}
+    findings += [f for _, _, found in screened for f in found]
+    channels, found = _without_repeated_frames(channels, steps)
+    findings += found
+    channels, found = _whole_quaternions(channels)
+    findings += found
     rows = np.unique(telemetry.label_tai_ns, return_index=True)
     return replace(
         telemetry,
@@ -73,65 +93,21 @@ def screen(telemetry: Telemetry, craft=None) -> Telemetry:
     )
 
 
-# ---- the order of time ----------------------------------------------------------------------------
+def _screened(c: Channel, craft) -> tuple[Channel, float, list[Finding]]:
+    """One channel with unusable samples marked, its quantisation step, and what was found."""
+    if c.kind.behaves == "state":
+        return c, 0.0, _pauses(c)
+    step = max(c.count_size, quantisation_step(c.values))
+    findings: list[Finding] = []
+    c, found = _within_limits(_unwrapped(c, findings), craft)
+    findings += found
+    for test in (_without_fills, _without_plateaus, _without_spikes, _without_stuck, _without_repeats):
+        c, found = test(c, step)
+        findings += found
+    return c, step, [*findings, *_falls(c), *_pauses(c)]
 
 
-def _in_order(telemetry: Telemetry) -> tuple[dict[str, Channel], list[Finding]]:
-    """Each channel increasing in time: a few late samples sorted, the first of duplicates kept."""
-    late: set[int] = set()
-    identical: set[int] = set()
-    differing: set[int] = set()
-    channels = {}
-    for name, c in telemetry.channels.items():
-        step = np.diff(c.tai_ns)
-        if (step > 0).all():
-            channels[name] = c
-            continue
-        if (step < 0).any():
-            late.update(c.tai_ns[_late(c, telemetry)].tolist())
-            c = c.where(np.argsort(c.tai_ns, kind="stable"))
-        first = np.concatenate(([True], np.diff(c.tai_ns) > 0))
-        kept = np.flatnonzero(first)[np.cumsum(first) - 1]  # for each sample, the one kept at its instant
-        same = c.values == c.values[kept]
-        differing.update(c.tai_ns[~first & ~same].tolist())
-        identical.update(c.tai_ns[~first & same].tolist())
-        channels[name] = c.where(first)
-    found = []
-    for what, instants, detail in (
-        ("disorder", late, "late samples, sorted into place"),
-        ("duplicate", identical - differing, "time stamps occur twice with the same values; the first is kept"),
-        ("conflict", differing, "time stamps occur twice with different values; the first is kept"),
-    ):
-        if instants:
-            found.append(Finding("", what, len(instants), min(instants), detail))
-    return channels, found
-
-
-def _late(c: Channel, telemetry: Telemetry) -> np.ndarray:
-    """Samples out of order: all but a longest non-decreasing subsequence."""
-    from bisect import bisect_right
-
-    tails: list[int] = []
-    length = np.empty(len(c.tai_ns), np.int64)
-    for i, t in enumerate(c.tai_ns.tolist()):
-        k = bisect_right(tails, t)
-        tails[k : k + 1] = [t]
-        length[i] = k
-    in_order, want, last = np.zeros(len(length), bool), len(tails) - 1, c.tai_ns.max()
-    for i in range(len(length) - 1, -1, -1):
-        if length[i] == want and c.tai_ns[i] <= last:
-            in_order[i], last, want = True, c.tai_ns[i], want - 1
-    late = np.flatnonzero(~in_order)
-    if len(late) > max(LATE_FEW, LATE_PART * len(length)) or 2 * len(late) >= len(length):
-        back = int(np.flatnonzero(np.diff(c.tai_ns) < 0)[0]) + 1
-        raise BadInput(
-            f"time runs backwards: {telemetry.describe_time(int(c.tai_ns[back]))} follows "
-            f"{telemetry.describe_time(int(c.tai_ns[back - 1]))}, and {len(late)} of {len(length)} samples are out of order",
-            channel=c.name,
-            time=telemetry.describe_time(int(c.tai_ns[back])),
-            remedy="Sort the table by time, or divide it where the clock was reset.",
-        )
-    return late
+# ---- pauses -----------------------------------------------------------------------------------------
 
 
 def _pauses(c: Channel) -> list[Finding]:
@@ -188,8 +164,15 @@ def sample_noise(c: Channel) -> float:
     return sigma if np.isfinite(sigma) else 0.0
 
 
+#: A longer record's quantisation step is inferred from blocks of its samples.
+_LEVELS_FROM, _BLOCK = 1 << 17, 1 << 14
+
+
 def quantisation_step(values: np.ndarray) -> float:
     """The step all values are multiples of, from their smallest differences. SI; 0 where there is none."""
+    if len(values) > _LEVELS_FROM:  # neighbouring samples have neighbouring levels: blocks of them serve
+        starts = np.linspace(0, len(values) - _BLOCK, _LEVELS_FROM // _BLOCK).astype(int)
+        values = np.concatenate([values[i : i + _BLOCK] for i in starts])
     levels = np.unique(values)
     steps = np.diff(levels)
     steps = steps[steps > 1e-12 * np.maximum(np.abs(levels[1:]), np.abs(levels[:-1]))]
@@ -210,10 +193,13 @@ def quantisation_step(values: np.ndarray) -> float:
 # ---- single channels ----------------------------------------------------------------------------------
 
 
-def _unwrapped(c: Channel) -> tuple[Channel, list[Finding]]:
-    """Unwrap a declared modulus within each gap-free stretch; across a gap the number of turns is not known."""
+def _unwrapped(c: Channel, findings: list[Finding]) -> Channel:
+    """Unwrap a declared modulus within each gap-free stretch.
+
+    Across a gap the number of turns is not known: a quantity with a sign begins each stretch on the turn nearest zero, so that
+    a negative value written without sign is read as negative."""
     if c.modulus <= 0:
-        return c, []
+        return c
     values, count, first = c.values.copy(), 0, 0
     for part in segments(c.tai_ns, BRIDGED, c.cadence_ns):
         jumps = np.abs(np.diff(c.values[part])) > c.modulus / 2
@@ -221,34 +207,121 @@ def _unwrapped(c: Channel) -> tuple[Channel, list[Finding]]:
             values[part] = np.unwrap(c.values[part], period=c.modulus)
             first = first or int(c.tai_ns[part][1:][jumps][0])
             count += int(jumps.sum())
-    c = replace(c, values=values, modulus=0.0)
-    return c, [Finding(c.name, "wrap", count, first, "wraps at the declared modulus, unwrapped")] if count else []
+        if c.kind.stem in _SIGNED:
+            values[part] -= c.modulus * np.rint(float(np.median(values[part])) / c.modulus)
+    if count:
+        findings.append(Finding(c.name, "wrap", count, first, "wraps at the declared modulus, unwrapped"))
+    return replace(c, values=values, modulus=0.0)
 
 
-def _without_spikes(c: Channel) -> tuple[Channel, list[Finding]]:
+def _within_limits(c: Channel, craft) -> tuple[Channel, list[Finding]]:
+    """A wheel's few samples beyond its rate limit; many of them are a wrong unit (``_implausible``)."""
+    limits = {} if craft is None else {w.name: w.rate_limit for w in craft.wheels if w.rate_limit}
+    if c.kind.stem != "wheel_rate" or c.member not in limits:
+        return c, []
+    beyond = np.abs(c.values) > _OVER_LIMIT * limits[c.member]
+    if np.mean(beyond) > _FEW:
+        return c, []
+    return _marked(c, beyond, "fill", f"values beyond the wheel's rate limit of {limits[c.member]:.4g} rad/s; not used")
+
+
+def _without_fills(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
+    """A value that recurs bit for bit far outside the range of all others, which are alike before and after it.
+
+    A step to another level, or motion, has values between, or does not come back."""
+    values = c.values
+    if c.kind.behaves == "cumulative" or len(values) < _FEWEST:
+        return c, []
+    fill = np.zeros(len(values), bool)
+    for _ in range(3):  # more than one fill value may occur, the farthest first
+        rest = values[~fill] if fill.any() else values
+        centre = float(np.median(rest))
+        low, high = float(np.min(rest)), float(np.max(rest))
+        far = high if high - centre > centre - low else low
+        here = (values == far) & ~fill
+        others = values[~fill & ~here]
+        if here.sum() < 2 or len(others) < _FEWEST or far == 0:
+            break
+        spread = float(np.ptp(others)) + 10 * step
+        known = np.float32(abs(far)) in _FILL_VALUES
+        if abs(far - centre) < (_FAR if not known else _NEAR) * max(spread, 1e-12 * abs(far)):
+            break
+        if not known and not _comes_back(values, here, fill, 0.2 * abs(far - centre)):
+            break
+        fill |= here
+    if not fill.any():
+        return c, []
+    said = ", ".join(f"{v:.6g}" for v in np.unique(values[fill]))
+    return _marked(
+        c, fill, "fill", f"the value {said} {c.kind.unit} recurs far outside the range of all others; not used"
+    )
+
+
+def _comes_back(values, here, fill, within: float) -> bool:
+    """Whether the samples before and after each run are alike."""
+    sound = np.flatnonzero(~here & ~fill)
+    starts, stops = _runs_of(here)
+    before = np.searchsorted(sound, starts) - 1
+    after = np.searchsorted(sound, stops - 1)
+    inside = (before >= 0) & (after < len(sound))
+    if not inside.any():
+        return False
+    return bool((np.abs(values[sound[before[inside]]] - values[sound[after[inside]]]) < within).all())
+
+
+def _without_plateaus(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
+    """A sensor at the end of its range: the channel's largest or smallest value held, entered and left at once."""
+    if c.kind.stem not in _MEASURED or len(c.values) < _FEWEST:
+        return c, []
+    flat = np.zeros(len(c.values), bool)
+    for extreme in (np.max(c.values), np.min(c.values)):
+        starts, stops = _runs_of(c.values == extreme)
+        inside = (starts > 0) & (stops < len(c.values)) & (stops - starts >= _PLATEAU)
+        if not inside.any():
+            continue
+        change, floor = np.abs(np.diff(c.values)), max(3 * step, 3 * sample_noise(c))
+        starts, stops = starts[inside], stops[inside]
+        abrupt = (change[starts - 1] > floor) & (change[stops - 1] > floor)
+        starts, stops = starts[abrupt], stops[abrupt]
+        if len(starts) < 2 and not (stops - starts >= 2 * _PLATEAU).any():
+            continue  # one short plateau may be the top of a curve
+        for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
+            flat[start:stop] = True
+    return _marked(
+        c, flat, "saturated", "the channel's extreme value is held: a sensor at the end of its range? Not used"
+    )
+
+
+def _without_spikes(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     """Single samples far off both neighbours, which agree with each other and with theirs.
 
     A kick, a step or the apex of a triangle has at least one neighbour between: those are kept."""
     n = len(c.values)
-    if c.kind.behaves == "steps" or n < 7:
+    if c.kind.behaves == "steps" or n < _FEWEST:
         return c, []
     x = np.pad(c.values, 2, mode="edge")
     before2, before, here, after, after2 = x[:-4], x[1:-3], c.values, x[3:-1], x[4:]
     height = np.abs(here - (before + after) / 2)
-    # noise may change with time: the larger of the whole record's and that of about 30 samples, by a running median
     bend = np.abs(before - 2 * here + after)
     sigma = max(float(np.median(bend)), 1e-12 * float(np.max(np.abs(here)))) / _MEDIAN_OF_SECOND
-    local = median_filter(bend, min(31, n), mode="nearest") / _MEDIAN_OF_SECOND
-    floor = np.maximum(np.maximum(sigma, local), max(c.count_size, quantisation_step(c.values)) / 2)
-    steps = np.diff(c.tai_ns)
-    beside = np.concatenate(([False], np.maximum(steps[:-1], steps[1:]) <= 3.5 * c.cadence_ns, [False]))
-    spike = beside & (height > SPIKE_SIGMAS * floor)
+    spike = height > SPIKE_SIGMAS * max(sigma, step / 2)
     for a, b in ((before, after), (before2, before), (after, after2)):
         spike &= np.abs(a - b) < AGREE * height
+    at = np.flatnonzero(spike & c.valid)
+    if len(at) == 0:
+        return c, []
+    # noise may change with time: that of about 30 samples must be exceeded too
+    width = min(31, n)
+    around = np.clip(at[:, None] + np.arange(-(width // 2), width - width // 2), 0, n - 1)
+    local = np.median(bend[around], axis=1) / _MEDIAN_OF_SECOND
+    steps = np.diff(c.tai_ns)
+    beside = np.maximum(steps[np.maximum(at - 1, 0)], steps[np.minimum(at, n - 2)]) <= 3.5 * c.cadence_ns
+    spike[:] = False
+    spike[at] = beside & (at > 0) & (at < n - 1) & (height[at] > SPIKE_SIGMAS * local)
     return _marked(c, spike, "spike", "single samples far off both neighbours, not used")
 
 
-def _without_stuck(c: Channel) -> tuple[Channel, list[Finding]]:
+def _without_stuck(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     """A noisy sensor that repeats one value for a long run."""
     if c.kind.stem not in _MEASURED or len(c.values) < 3 * STUCK_RUN:
         return c, []
@@ -256,10 +329,9 @@ def _without_stuck(c: Channel) -> tuple[Channel, list[Finding]]:
         detail = f"the same value throughout, {c.values[0]:g}: a stuck sensor, or motion below one count? Used"
         return c, [Finding(c.name, "still", len(c.values), int(c.tai_ns[0]), detail)]
     stuck, still = np.zeros(len(c.values), bool), np.zeros(len(c.values), bool)
-    step = quantisation_step(c.values)
-    for start, stop in _runs(np.diff(c.values) == 0):
-        if stop - start + 1 < STUCK_RUN:
-            continue
+    starts, stops = _runs_of(np.diff(c.values) == 0)
+    long = stops - starts + 1 >= STUCK_RUN
+    for start, stop in zip(starts[long].tolist(), stops[long].tolist(), strict=True):
         change = np.diff(c.values[max(0, start - 60) : start + 1])
         if len(change) < STUCK_RUN or np.std(change) <= step:
             continue
@@ -270,42 +342,50 @@ def _without_stuck(c: Channel) -> tuple[Channel, list[Finding]]:
         noisy = np.sum(change[1:] * change[:-1]) < -0.2 * np.sum(change**2)
         rest = c.kind.stem == "wheel_rate" and c.values[stop] == 0  # a wheel at rest reads exactly zero
         abrupt = np.median(np.abs(change[-5:])) > max(5 * step, 0.3 * np.median(np.abs(change)))
+        # a coasting wheel does not stop at a speed: its tachometer has
+        slows = len(change) >= 2 * STUCK_RUN and (change * np.sign(c.values[stop]) <= 0).all()
+        held = c.kind.stem == "wheel_rate" and abrupt and slows
         if not rest and (noisy or abrupt):
-            (stuck if noisy else still)[start + 1 : stop + 1] = True
-    c, found = _marked(c, stuck, "stuck", "samples repeat one value after noisy ones; not used")
+            (stuck if noisy or held else still)[start + 1 : stop + 1] = True
+    c, found = _marked(c, stuck, "stuck", "samples repeat one value after others that change; not used")
     if still.any():
         detail = "samples repeat one value after motion: a stuck sensor, or rest? Used"
         found.append(Finding(c.name, "still", int(still.sum()), int(c.tai_ns[still][0]), detail))
     return c, found
 
 
-def _without_repeats(c: Channel) -> tuple[Channel, list[Finding]]:
+def _without_repeats(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     """Short runs of one value in a noisy channel, more frequent than quantisation produces."""
     change = np.diff(c.values)
-    if c.kind.stem not in _MEASURED | {"control_torque"} or len(change) < 20 or not change.any():
+    if c.kind.stem not in _MEASURED | {"control_torque"} or len(change) < 20 or change.all() or not change.any():
         return c, []
-    step = max(quantisation_step(c.values), 1e-15 * float(np.max(np.abs(c.values))))
+    step = max(step, 1e-15 * float(np.max(np.abs(c.values))))
     moves = np.abs(change[change != 0])
-    typical = float(np.median(moves))
-    if typical < 10 * step:
+    if float(np.median(moves)) < _FINE * step:
         return c, []
-    repeated, isolated = np.zeros(len(c.values), bool), 0
-    for start, stop in _runs(change == 0):
-        inside = start > 0 and stop < len(change)
-        if inside and stop - start < STUCK_RUN - 1 and min(abs(change[start - 1]), abs(change[stop])) > 3 * step:
-            repeated[start + 1 : stop + 1] = True
-            isolated += 1
-    # from quantisation alone, no change is about as frequent as any other small change of one step
-    width = max(5 * step, float(np.quantile(moves, 0.1)))
-    expected = 1.5 * np.sum(moves <= width) * step / (2 * width)
-    if isolated == 0 or pdtrc(isolated - 1, expected) > CHANCE:
+    starts, stops = _runs_of(change == 0)
+    inside = (starts > 0) & (stops < len(change)) & (stops - starts < STUCK_RUN - 1)
+    starts, stops = starts[inside], stops[inside]
+    alone = np.minimum(np.abs(change[starts - 1]), np.abs(change[stops])) > 3 * step
+    starts, stops = starts[alone], stops[alone]
+    if len(starts) == 0 or pdtrc(len(starts) - 1, _zeros_by_chance(moves, step)) > CHANCE:
         return c, []
+    edges = np.zeros(len(c.values) + 1, np.int64)
+    edges[starts + 1] += 1
+    edges[stops + 1] -= 1
+    repeated = np.cumsum(edges[:-1]) > 0
     if c.kind.stem == "control_torque":  # a command may be held
         first = int(c.tai_ns[repeated][0])
         return c, [
             Finding(c.name, "repeat", int(repeated.sum()), first, "samples repeat the previous value bit for bit")
         ]
     return _marked(c, repeated, "repeat", "samples repeat the previous value bit for bit: stale, not used")
+
+
+def _zeros_by_chance(moves: np.ndarray, step: float) -> float:
+    """Samples that repeat from quantisation alone: no change is about as frequent as any other small change of one step."""
+    width = max(5 * step, float(np.quantile(moves, 0.1)))
+    return float(1.5 * np.sum(moves <= width) * step / (2 * width))
 
 
 def _falls(c: Channel) -> list[Finding]:
@@ -339,10 +419,14 @@ def _falls(c: Channel) -> list[Finding]:
     ]
 
 
-def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
-    """[start, stop) of each run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+def _runs_of(flags: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Starts and stops of each run of True, [start, stop)."""
+    edges = np.flatnonzero(flags[1:] != flags[:-1]) + 1
+    if len(flags) and flags[0]:
+        edges = np.concatenate(([0], edges))
+    if len(flags) and flags[-1]:
+        edges = np.concatenate((edges, [len(flags)]))
+    return edges[::2], edges[1::2]
 
 
 def _marked(c: Channel, hit: np.ndarray, what: str, detail: str) -> tuple[Channel, list[Finding]]:
@@ -355,21 +439,39 @@ def _marked(c: Channel, hit: np.ndarray, what: str, detail: str) -> tuple[Channe
 # ---- several channels -------------------------------------------------------------------------------
 
 
-def _without_repeated_frames(channels: dict[str, Channel]) -> tuple[dict[str, Channel], list[Finding]]:
-    """Instants at which all noisy channels sampled together repeat their previous values."""
-    frames: dict[bytes, list[str]] = {}
+def _frames(channels: dict[str, Channel], stems: frozenset[str]) -> list[list[str]]:
+    """Names of channels of some families that are sampled at the same instants."""
+    frames: list[list[str]] = []
     for name, c in channels.items():
-        if c.kind.stem in _MEASURED and len(c.values) >= 20 and np.any(np.diff(c.values)):
-            frames.setdefault(c.tai_ns.tobytes(), []).append(name)
+        if c.kind.stem not in stems or len(c.values) < 20:
+            continue
+        for names in frames:
+            other = channels[names[0]].tai_ns
+            if other is c.tai_ns or (len(other) == len(c.tai_ns) and np.array_equal(other, c.tai_ns)):
+                names.append(name)
+                break
+        else:
+            frames.append([name])
+    return [names for names in frames if len(names) >= 3]
+
+
+def _without_repeated_frames(channels: dict[str, Channel], steps: dict[str, float]):
+    """Instants at which all noisy channels sampled together repeat their previous values."""
     channels, findings = dict(channels), []
-    for names in frames.values():
-        same = np.array([np.diff(channels[n].values) == 0 for n in names])
-        whole = np.all(same, axis=0)
-        by_chance = np.prod(same.mean(axis=1)) * whole.size
+    moving = {n: c for n, c in channels.items() if n in steps and np.any(c.values[1:] != c.values[:-1])}
+    for names in _frames(moving, _MEASURED):
+        values = [channels[n].values for n in names]
+        whole = np.logical_and.reduce([v[1:] == v[:-1] for v in values])
+        if not whole.any():
+            continue
+        by_chance = whole.size * float(
+            np.prod([_repeats_by_chance(v, steps[n]) for n, v in zip(names, values, strict=True)])
+        )
         # a long run of equal frames, or one at either end, is rest and not repetition
-        for start, stop in _runs(whole):
+        starts, stops = _runs_of(whole)
+        for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
             whole[start:stop] = start > 0 and stop < whole.size and stop - start < STUCK_RUN - 1
-        if len(names) < 3 or not whole.any() or pdtrc(whole.sum() - 1, min(by_chance, 1e-3 * whole.size)) > CHANCE:
+        if not whole.any() or pdtrc(whole.sum() - 1, by_chance) > CHANCE:
             continue
         hit = np.concatenate(([False], whole))
         for n in names:
@@ -381,15 +483,72 @@ def _without_repeated_frames(channels: dict[str, Channel]) -> tuple[dict[str, Ch
     return channels, findings
 
 
+def _repeats_by_chance(values: np.ndarray, step: float) -> float:
+    """Share of the samples that repeat the last one by chance; a fine channel does so seldom."""
+    change = np.diff(values)
+    share, moves = float(np.mean(change == 0)), np.abs(change[change != 0])
+    if float(np.median(moves)) < _FINE * step:
+        return share
+    return min(share, _zeros_by_chance(moves, max(step, 1e-15)) / change.size)
+
+
+def _without_unfilled(channels: dict[str, Channel]) -> tuple[dict[str, Channel], list[Finding]]:
+    """Rows in which every measured channel reads exactly zero, between rows in which they do not: packets that were not filled."""
+    channels, findings = dict(channels), []
+    for names in _frames(channels, _MEASURED):
+        zero = np.ones(len(channels[names[0]].values), bool)
+        for n in names:
+            zero &= channels[n].values == 0
+        if not zero.any() or zero.all():
+            continue
+        # at rest all read zero too; but then nothing jumps to zero and back
+        jumps = np.zeros(len(zero), bool)
+        for n in names:
+            v = channels[n].values
+            far = np.abs(np.diff(v)) > max(
+                SPIKE_SIGMAS * sample_noise(channels[n]), 0.1 * float(np.median(np.abs(v[~zero])))
+            )
+            jumps |= np.concatenate(([False], far)) | np.concatenate((far, [False]))
+        unfilled = np.zeros(len(zero), bool)
+        starts, stops = _runs_of(zero)
+        for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
+            ends = [i for i in (start, stop - 1) if 0 < i < len(zero) - 1 or stop - start == 1]
+            unfilled[start:stop] = bool(ends) and all(jumps[i] for i in ends)
+        if not unfilled.any():
+            continue
+        for n in names:
+            channels[n] = replace(channels[n], valid=channels[n].valid & ~unfilled)
+        first = int(channels[names[0]].tai_ns[unfilled][0])
+        detail = f"rows in which all {len(names)} measured channels are zero: unfilled packets; not used"
+        findings.append(Finding("", "fill", int(unfilled.sum()), first, detail))
+    return channels, findings
+
+
+def _of_one_sign(channels: dict[str, Channel]) -> tuple[dict[str, Channel], list[Finding]]:
+    """Quaternions that follow each other without a change of sign: q and -q are the same attitude."""
+    channels = dict(channels)
+    for stem in ("quaternion", "commanded_quaternion"):
+        names = [f"{stem}_{m}" for m in "wxyz"]
+        if not all(n in channels for n in names):
+            continue
+        parts = [channels[n] for n in names]
+        if any(not np.array_equal(p.tai_ns, parts[0].tai_ns) for p in parts[1:]):
+            continue
+        q = np.stack([p.values for p in parts], axis=1)
+        flips = np.concatenate(([False], np.sum(q[1:] * q[:-1], axis=1) < 0))
+        if flips.any():
+            sign = 1.0 - 2.0 * (np.cumsum(flips) % 2)
+            channels |= {n: replace(p, values=p.values * sign) for n, p in zip(names, parts, strict=True)}
+    return channels, []
+
+
 def _whole_quaternions(channels: dict[str, Channel]) -> tuple[dict[str, Channel], list[Finding]]:
     """A quaternion is used only with all four components at one instant and unit length."""
     names = [f"quaternion_{m}" for m in "wxyz"]
     if not all(n in channels for n in names):
         return channels, []
     parts = [channels[n] for n in names]
-    instants = parts[0].tai_ns
-    for p in parts[1:]:
-        instants = np.intersect1d(instants, p.tai_ns, assume_unique=True)
+    instants = common_instants(parts)
     rows = [np.searchsorted(p.tai_ns, instants) for p in parts]
     q = np.stack([p.values[r] for p, r in zip(parts, rows, strict=True)], axis=1)
     usable = np.all([p.valid[r] for p, r in zip(parts, rows, strict=True)], axis=0)
@@ -412,17 +571,18 @@ def _implausible(channels: dict[str, Channel], craft) -> list[Doubt]:
         kind, whose = c.kind, "the plausible limit"
         limit = kind.plausible
         if kind.stem == "wheel_rate" and c.member in limits:
-            limit, whose = 1.05 * limits[c.member], f"{craft.name}'s wheel rate limit"
+            limit, whose = _OVER_LIMIT * limits[c.member], f"{craft.name}'s wheel rate limit"
         if limit is None or not c.valid.any():
             continue
         size = np.abs(c.usable.values)
-        if np.mean(size > limit) > 0.01:  # a short outlier is not a wrong unit
+        if np.mean(size > limit) > _FEW:  # a short outlier is not a wrong unit
             beyond.setdefault((kind.stem, limit, whose), []).append((c.name, float(np.max(size))))
     doubts = []
     for (stem, limit, whose), those in beyond.items():
         kind = next(kind_of(n) for n, _ in those)
         given = channels[those[0][0]].unit_given
-        guess = f": are the values {kind.mistaken_for} labelled {given}?" if kind.mistaken_for else ""
+        wrong = " or ".join(u for u in kind.mistaken_for.split(" or ") if u and u != given)
+        guess = f": are the values {wrong} labelled {given}?" if wrong else ""
         doubts.append(
             IMPLAUSIBLE(
                 channels=[n for n, _ in those],

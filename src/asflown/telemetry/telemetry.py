@@ -14,7 +14,7 @@ import numpy as np
 
 from ..kit.doubts import Doubts
 from ..kit.errors import BadInput, some_of
-from ..kit.timeline import NS, cadence_ns, seconds_since, segments, utc_label, utc_to_tai_ns
+from ..kit.timeline import NS, cadence_ns, seconds_since, segments, tai_to_datetime64, utc_label, utc_to_tai_ns
 from .channels import AXES, ChannelKind, kind_of, member_of
 from .findings import Finding, found_in
 
@@ -88,6 +88,15 @@ class Channel:
     def segments(self) -> list[slice]:
         """Stretches of samples without a gap, as slices; call on ``usable``."""
         return segments(self.tai_ns, BRIDGED, self.cadence_ns)
+
+
+def common_instants(parts: list[Channel]) -> np.ndarray:
+    """Instants at which all the channels were sampled. [ns TAI]"""
+    instants = parts[0].tai_ns
+    for p in parts[1:]:
+        if p.tai_ns is not instants and not np.array_equal(p.tai_ns, instants):
+            instants = np.intersect1d(instants, p.tai_ns, assume_unique=True)
+    return instants
 
 
 @dataclass(frozen=True)
@@ -280,6 +289,73 @@ class Telemetry:
                 remedy="Widen the window.",
             )
         return replace(self, channels=kept)
+
+    def to_xarray(self):
+        """The channels as a Dataset in SI, each over its own instants.
+
+        Returns
+        -------
+        xarray.Dataset
+            Variables by channel name with ``units`` and ``long_name``, and ``valid_<name>``; coordinates ``time`` (of channels that are
+            sampled together: ``time``, ``time_2``, …) in UTC.  NaN nowhere: samples that must not be used have valid = False.
+        """
+        import xarray
+
+        clocks: list[np.ndarray] = []
+        variables, coordinates = {}, {}
+        for name, c in self.channels.items():
+            at = next((k for k, t in enumerate(clocks) if np.array_equal(t, c.tai_ns)), len(clocks))
+            if at == len(clocks):
+                clocks.append(c.tai_ns)
+            dim = "time" if at == 0 else f"time_{at + 1}"
+            coordinates[dim] = tai_to_datetime64(c.tai_ns)
+            variables[name] = (dim, c.values, {"units": c.kind.unit, "long_name": c.kind.meaning})
+            variables[f"valid_{name}"] = (dim, c.valid)
+        return xarray.Dataset(
+            variables, coordinates, {"source": self.source, "sha256": self.sha256, "epoch": self.epoch_label}
+        )
+
+    def to_pandas(self):
+        """The channels as a DataFrame in SI: seconds from the epoch as index, a column ``name [unit]`` each, missing where not sampled or not to be used.
+
+        Returns
+        -------
+        pandas.DataFrame
+        """
+        import pandas
+
+        columns = {}
+        for name, c in self.channels.items():
+            used = c.usable
+            columns[f"{name} [{c.kind.unit}]"] = pandas.Series(used.values, index=pandas.Index(used.tai_ns))
+        frame = pandas.DataFrame(columns)
+        frame.index = pandas.Index(self.seconds(frame.index.to_numpy(np.int64)), name="time_s")
+        frame.attrs = {"source": self.source, "sha256": self.sha256, "epoch": self.epoch_label}
+        return frame
+
+    def plot(self, channels=None):
+        """Draw channels over time, a panel for each family; samples that are not used are marked.
+
+        Parameters
+        ----------
+        channels : collection of str, optional
+            Names; all of them unless given.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        BadInput
+            For a channel that the telemetry does not have.
+        """
+        from importlib import import_module
+
+        # plots are above telemetry: the function is imported by name, and only when needed
+        return import_module("asflown.plots.telemetry").draw_telemetry(
+            self, [self.channel(n).name for n in channels or self.channels]
+        )
 
     def excluding(self, exclusions: list[Exclusion]) -> Telemetry:
         """The telemetry with some spans marked as unusable.

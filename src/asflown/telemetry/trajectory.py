@@ -18,7 +18,8 @@ from ..kit.files import sha256_of
 from ..kit.quantities import si_factor
 from .assemble import origin_of, time_scale
 from .channels import AXES, split_header
-from .tables import Table, numbers_of, read_csv, times_of
+from .tables import Table, numbers_of, times_of
+from .text import read_csv
 
 _FEWEST = 4
 _UNITS = {"position": "m", "velocity": "m/s"}
@@ -81,7 +82,7 @@ def _read(path: Path) -> TrajectoryTable:
             line=table.line(k),
             remedy="Correct the row, or leave it out.",
         )
-    return TrajectoryTable(tai_ns, origin is not None or scale != "s", r, v, sha256_of(data))
+    return TrajectoryTable(tai_ns, origin is not None or scale.dated, r, v, sha256_of(data))
 
 
 def _column(table: Table, name: str, unit: str) -> np.ndarray:

@@ -24,7 +24,6 @@ import numpy as np
 
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.ensemble import spread
-from ...kit.errors import BadInput
 from ...kit.smoother import smooth
 from ...telemetry.channels import AXES
 from ..subject import INERTIA_SHARE, SPIN_SHARE, Grid, Subject

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...kit.ensemble import spread
 from ...kit.errors import BadInput, some_of
 from ...kit.timeline import NS
 from ..environment import NAMES, environment_of
 
 if TYPE_CHECKING:
-    from ..environment import Air, Term
+    from ..environment import Air
     from ..subject import Subject
     from .result import TorqueResult
 

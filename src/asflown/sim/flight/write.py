@@ -12,7 +12,7 @@ import numpy as np
 from ...kit.files import write_text
 from ...kit.timeline import utc_label
 from ...telemetry.channels import AXES
-from ...telemetry.tables import write_table
+from ...telemetry.write import write_table
 from .faults import true_drag
 from .world import acting_dipole, acting_drag, acting_sunlight, reference_density
 

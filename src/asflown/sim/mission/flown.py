@@ -18,7 +18,7 @@ from ...kit.errors import BadInput
 from ...kit.files import check_folder, write_text
 from ...kit.schema import Annotated, Doc, DoubtRecord, TypedDict
 from ...kit.timeline import utc_to_tai_ns
-from ...telemetry.tables import write_table
+from ...telemetry.write import write_table
 from ..flight import fly, stream
 from ..scenario import CoverMotion, Scenario, load_scenario
 from .ageing import Figures, aged, figures_of
