@@ -7,8 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import periodogram
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 if TYPE_CHECKING:
     from .whitened import Whitened
@@ -60,6 +59,8 @@ def residual_of(white: Whitened, theta: np.ndarray) -> Residual:
     when = 0.5 * (middle[1:] + middle[:-1])
     sigma = np.sqrt(np.median((noise[1:] + noise[:-1]) / step[:, None] ** 2, axis=0))
     filled = np.where(whole[:, None], torque, 0.0)
+    from scipy.signal import periodogram  # a second of import that only this needs
+
     f, density = periodogram(filled, 1 / float(np.median(step)), axis=0, detrend="constant")
     keep = whole if whole.sum() >= 2 else np.ones(len(whole), bool)
     e = (white.E[:, 0] - white.E[:, 1:] @ theta).reshape(-1, 3)
@@ -75,4 +76,4 @@ def _white(e: np.ndarray) -> float:
     if lags < 1 or power == 0:
         return 1.0
     r = np.array([float(e[:-k] @ e[k:]) / power for k in range(1, lags + 1)])
-    return float(chi2.sf(n * (n + 2) * np.sum(r**2 / (n - np.arange(1, lags + 1))), lags))
+    return float(chdtrc(lags, n * (n + 2) * np.sum(r**2 / (n - np.arange(1, lags + 1)))))

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from ...kit.scatter import robust_sigma
 from ...kit.timeline import runs
@@ -268,7 +268,7 @@ class Finder:
         if far.sum() > max(1, 0.02 * len(r)) or far[:2].any() or far[-2:].any():
             return False
         total, freedom, largest = slow_misfit([p], [np.where(far, 0.0, r)], noise)
-        return largest < own_ways or total < chi2.isf(_CHANCE, freedom)
+        return largest < own_ways or total < chdtri(freedom, _CHANCE)
 
     def falls(self, a: int, b: int) -> bool:
         """Whether the wheel is slower in the second half by more than noise does."""
@@ -362,7 +362,7 @@ def _law(finder: Finder, spans: list[tuple[int, int]]) -> tuple[Law, list[np.nda
         keep = again
     total, freedom, _ = slow_misfit(used, residuals, sigma)
     # a chi square of this size is still chance, and widening for it would make the band too wide on average
-    widened = total / freedom if total > chi2.isf(0.01, freedom) else 1.0
+    widened = total / freedom if total > chdtri(freedom, 0.01) else 1.0
     rate = float(np.mean(np.concatenate([p.u for p in used])))
     law = Law(x[:2], widened * sigma**2 * inverse[:2, :2], rate, widened)
     return law, keep, [coast(p.s, m, x[0], x[1]) for p, m in zip(parts, x[2:], strict=True)]

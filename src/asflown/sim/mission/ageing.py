@@ -20,7 +20,6 @@ import numpy as np
 from scipy.integrate import cumulative_simpson
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import brentq
-from scipy.signal import find_peaks
 
 from ...kit.errors import BadInput
 from ..flight import MovingPart, momentum_per_rate, moving_part
@@ -70,6 +69,8 @@ def figures_of(time_s, torque_Nm, motor_on_s: float) -> Figures:
 
 def _two_largest(t, v) -> float:
     step = float(np.median(np.diff(t)))
+    from scipy.signal import find_peaks  # a second of import that only this needs
+
     at, _ = find_peaks(v, height=0, prominence=STANDS_OUT * v.max(), distance=round(APART_S / step))
     return float(np.mean(np.sort(v[at])[-2:])) if len(at) else 0.0
 

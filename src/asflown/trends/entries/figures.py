@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from ...kit.doubts import Kind, Severity
 from ...kit.ensemble import spread
@@ -79,6 +78,8 @@ class Torque:
         if len(v) < 3 or not np.nanmax(v) > 0:
             return np.empty(0)
         step = float(np.median(np.diff(t)))
+        from scipy.signal import find_peaks  # a second of import that only this needs
+
         at, _ = find_peaks(
             np.nan_to_num(v), height=0, prominence=_STANDS_OUT * np.nanmax(v), distance=max(1, round(_APART_S / step))
         )
