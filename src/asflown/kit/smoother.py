@@ -131,6 +131,45 @@ def smooth(model: Model, data: Measurements) -> Smoothed:
     return Smoothed(mean, covariances, case, whitened, alone, float(ll))
 
 
+@dataclass(frozen=True)
+class Score:
+    """Log likelihood, and its derivatives by the model's matrices.
+
+    By A (types, n, n), Q (types, n, n), R (rows,) and the covariance at the first step (n, n).  ``kick``: (N, n), of an impulse on
+    each state as each step begins, the size that the data ask for over its sigma (the auxiliary residuals of de Jong and
+    Penzer, J. Am. Stat. Assoc. 93 (1998) 796)."""
+
+    log_likelihood: float
+    A: np.ndarray
+    Q: np.ndarray
+    R: np.ndarray
+    covariance: np.ndarray
+    kick: np.ndarray
+
+    def along(self, here: Model, there: Model) -> float:
+        """Change of the log likelihood, to first order, from one model to another of the same H, neither with driven parts."""
+        return float(
+            np.sum(self.A * (there.A - here.A))
+            + np.sum(self.Q * (there.Q - here.Q))
+            + self.R @ np.subtract(there.R, here.R, where=np.isfinite(here.R), out=np.zeros_like(here.R))
+            + np.sum(self.covariance * (there.covariance - here.covariance))
+        )
+
+
+def score(model: Model, data: Measurements) -> Score:
+    """The likelihood's exact derivatives from one smoothing: of all parameters for the price of two or three likelihoods.
+
+    With r and N the smoother's adjoint and its variance at a step, d/dQ = (r r^T - N)/2 and d/dA = r x^T - N A P, x and P the
+    smoothed mean and the filtered covariance a step before (Koopman and Shephard, Biometrika 79 (1992) 823; no inverse of Q)."""
+    arrays = _arrays(model, data)
+    ll, mean, covariances, innovation, variance, product, origin = _filter(*arrays, True)
+    A, _, _, _, which, H, R, _, _, start, row, _, period, _ = arrays
+    found = _slopes(
+        A, which, H, len(R), start, row, period, mean, covariances, innovation, variance, product, origin
+    )
+    return Score(float(ll), *found)
+
+
 def _arrays(model: Model, data: Measurements):
     which, start, row = (np.ascontiguousarray(x, dtype=np.int64) for x in (model.which, data.start, data.row))
     return (
@@ -352,6 +391,87 @@ def _backward(A, which, H, start, row, period, mean, covariances, innovation, va
                 N, turned = turned, N
                 settled = 0 < period <= steps - k and _same_matrix(N, past[(k - 1) % phases])
     return case, alone
+
+
+@jit
+def _slopes(A, which, H, rows, start, row, period, mean, covariances, innovation, variance, product, origin):
+    """Derivatives of the log likelihood by A, Q, R and the first covariance, and ``Score.kick``; ``_backward``'s passage without its smoothed covariances."""
+    steps, n = mean.shape
+    phases = max(period, 1)
+    by_A, by_Q, by_R, first = np.zeros(A.shape), np.zeros(A.shape), np.zeros(rows), np.zeros((n, n))
+    kick = np.zeros((steps, n))
+    weight = np.empty(len(row))
+    # of the next period's steps: information from beyond, the same with the step's own, and N A P
+    past, whole, crossed = np.zeros((phases, n, n)), np.zeros((phases, n, n)), np.zeros((phases, n, n))
+    adjoint, later, x, line, N = np.zeros(n), np.zeros(n), np.empty(n), np.empty(n), np.zeros((n, n))
+    turned, work, back = np.empty((n, n)), np.empty((n, n)), np.empty(A.shape)
+    for c in range(len(A)):
+        back[c] = A[c].T
+    settled, again, crossed_again = False, False, False
+    for k in range(steps - 1, -1, -1):
+        was, again = again, settled and origin[k + period] == origin[k]
+        P = covariances[origin[k]]
+        for r in range(n):
+            x[r] = mean[k, r]
+            for c in range(n):
+                x[r] -= P[r, c] * adjoint[c]
+        if k < steps - 1:  # the step from here on
+            kind, phase = which[k + 1], (k + 1) % phases
+            if not (crossed_again and origin[k + period] == origin[k]):
+                _multiply(whole[phase], A[kind], work)
+                _multiply(work, P, crossed[phase])
+            for r in range(n):
+                for c in range(n):
+                    by_A[kind, r, c] -= later[r] * x[c] + crossed[phase, r, c]
+        phase = k % phases
+        if not again:
+            if was:
+                N[:] = past[phase]
+            past[phase] = N
+        for i in range(start[k + 1] - 1, start[k] - 1, -1):
+            own, h = start[origin[k]] + i - start[k], row[i]
+            u = innovation[i]
+            for r in range(n):
+                u += product[own, r] * adjoint[r]
+            u /= variance[i]
+            for r in range(n):
+                adjoint[r] -= H[h, r] * u
+            if again:
+                weight[i] = weight[start[k + period] + i - start[k]]
+            else:
+                weight[i] = _give_back(N, H[h], product[own], variance[i], line)
+            by_R[h] += 0.5 * (u * u - weight[i])
+        if not again:
+            whole[phase] = N
+        crossed_again = again
+        into = by_Q[which[k]] if k > 0 else first
+        for r in range(n):
+            for c in range(n):
+                into[r, c] += 0.5 * (adjoint[r] * adjoint[c] - whole[phase, r, c])
+            later[r] = adjoint[r]
+            if whole[phase, r, r] > 0:
+                kick[k, r] = -adjoint[r] / np.sqrt(whole[phase, r, r])
+        if k > 0:
+            _apply(back[which[k]], adjoint, line)
+            if not again:
+                _sandwich(back[which[k]], N, turned, work)
+                N, turned = turned, N
+                settled = 0 < period <= steps - k and _same_matrix(N, past[(k - 1) % phases])
+    return by_A, by_Q, by_R, first, kick
+
+
+@jit
+def _multiply(a, b, out):
+    """out = a b."""
+    n = len(a)
+    for r in range(n):
+        for c in range(n):
+            out[r, c] = 0.0
+        for i in range(n):
+            f = a[r, i]
+            if f != 0.0:
+                for c in range(n):
+                    out[r, c] += f * b[i, c]
 
 
 @jit

@@ -46,20 +46,23 @@ class Body:
     inertia_kgm2: float
     wiener: bool = False
 
-    STATES: ClassVar[int]
     RATE: ClassVar[int]  # index of the body rate, and of the actuators' momentum
     STORED: ClassVar[int]
     SPREAD: ClassVar[tuple[float, ...]]  # of the weak log-normal priors, in the order of the Levels
-    SEARCH: ClassVar[tuple[float, ...]] = (1e-8,)  # steps of the likelihood's gradient, one search after the other
     NARROWS: ClassVar[bool] = True  # whether the data may say how far off what is taken as known is
 
     @property
+    def states(self) -> int:
+        """How many."""
+        raise NotImplementedError
+
+    @property
     def torque(self) -> int:
-        return self.STATES - 2
+        return self.states - 2
 
     @property
     def slope(self) -> int:
-        return self.STATES - 1
+        return self.states - 1
 
     def dynamics(self, v) -> tuple[np.ndarray, np.ndarray]:
         """F and spectral density of all but the torque's own two rows."""
@@ -91,23 +94,26 @@ class Body:
     def model(self, v, times: Times, length_s: float, size_Nm) -> Model:
         """The model at the instants of a pass; ``size_Nm``: of the torque, one for all or (N,)."""
         F, Q = self.dynamics(v)
-        drive = np.zeros_like(Q)
         k = np.sqrt(3) / length_s
         F[self.torque, self.slope] = 1
         if not self.wiener:
             F[self.slope, [self.torque, self.slope]] = -(k**2), -2 * k
-        drive[self.slope, self.slope] = 4 * k**3 / self.inertia_kgm2**2
+        drive = 4 * k**3 / self.inertia_kgm2**2
+        one = np.ndim(size_Nm) == 0  # no part of the noise differs from step to step
+        if one:
+            Q[self.slope, self.slope] = drive * size_Nm**2
         A, fixed = discretize(F, Q, times.steps_s)
-        driven = discretize(F, drive, times.steps_s)[1][None]
-        size = np.broadcast_to(np.asarray(size_Nm, float), times.seconds.shape)
+        driven, scale = np.empty((0, *A.shape)), np.empty((len(times.seconds), 0))
+        if not one:
+            D = np.zeros_like(Q)
+            D[self.slope, self.slope] = drive
+            driven, scale = discretize(F, D, times.steps_s)[1][None], np.square(size_Nm)[:, None]
         # a Wiener torque has no size of its own: it starts within ten times what a Matern one would be
-        first = size[0] / self.inertia_kgm2 * (10 if self.wiener else 1)
-        deviation = np.concatenate([self.start(v, times), [first, k * first]])
+        first = np.ravel(size_Nm)[0] / self.inertia_kgm2 * (10 if self.wiener else 1)
+        deviation = np.array([*self.start(v, times), first, k * first])
         H, white = self.measured(v)
         H, R = H[times.base], (white**2 + times.quantum**2 / 12)[times.base] + (self.timing_s(v) * times.steep) ** 2
-        return Model(
-            A, fixed, driven, size[:, None] ** 2, times.which, H, R, np.zeros(self.STATES), np.diag(deviation**2)
-        )
+        return Model(A, fixed, driven, scale, times.which, H, R, np.zeros(self.states), np.diag(deviation**2))
 
     def smooth_model(self, v, times: Times) -> Model:
         """With the torque of the fitted levels."""

@@ -69,11 +69,14 @@ def _between(left, right, reach, on, extra):
 
 
 @jit
-def sample(G, b, evidence, prior, always, size, corner_prior, freedom, proposals, burn, kept, corners, level, rng):
+def sample(
+    G, b, evidence, prior, always, size, corner_prior, share, freedom, proposals, burn, kept, corners, level, rng
+):
     """``kept`` coefficient vectors, their numbers of corners, and which roughness each has.
 
     ``always``: prior sigma of the first columns, which are in every set; ``size``: of a bend's
-    prior variance, to start from; ``corners``, ``level``: columns in the set, and roughness, to start from.
+    prior variance, to start from; ``share``: (columns,), logarithm of how much more probable a corner is at each column than at the
+    usual one; ``corners``, ``level``: columns in the set, and roughness, to start from.
     Bends' own precisions and their size are drawn after every eighth proposal."""
     alpha, beta = corner_prior[0], corner_prior[1]
     most = _MOST_CORNERS
@@ -117,11 +120,13 @@ def sample(G, b, evidence, prior, always, size, corner_prior, freedom, proposals
                 precision2[count] = rng.gamma(freedom / 2) * 2 / freedom / variance
                 new, added = count + 1, c
                 ratio = math.log((alpha + bends) / (beta + free - bends - 1)) + math.log(free / (bends + 1.0))
+                ratio += share[c]
         elif kind < _REMOVED:  # removed
             if bends > 0:
                 j = fixed + int(rng.random() * bends)
                 new, gone = _without(active, precision, count, j, active2, precision2), active[j]
                 ratio = -math.log((alpha + bends - 1) / (beta + free - bends)) - math.log(free / (1.0 * bends))
+                ratio -= share[gone]
         elif kind < _MOVED:  # moved
             if bends > 0:
                 j = fixed + int(rng.random() * bends)
@@ -132,6 +137,7 @@ def sample(G, b, evidence, prior, always, size, corner_prior, freedom, proposals
                     new = _without(active, precision, count, j, active2, precision2) + 1
                     active2[new - 1], precision2[new - 1] = c, precision[j]
                     added, gone = c, active[j]
+                    ratio = share[added] - share[gone]
         elif kind < _SPLIT:  # split in two
             if bends > 0 and count < most:
                 j = fixed + int(rng.random() * bends)
@@ -145,6 +151,7 @@ def sample(G, b, evidence, prior, always, size, corner_prior, freedom, proposals
                     ways = _between(left, right, reach, on, active[j])
                     ratio = math.log((alpha + bends) / (beta + free - bends - 1))
                     ratio += math.log(bends * reach * reach) - math.log((bends + 1.0) * bends * ways)
+                    ratio += share[left] + share[right] - share[gone]
         elif kind < _MERGED:  # two merged
             if bends > 1:
                 j, j2 = fixed + int(rng.random() * bends), fixed + int(rng.random() * bends)
@@ -164,6 +171,7 @@ def sample(G, b, evidence, prior, always, size, corner_prior, freedom, proposals
                         added, gone, gone2 = x, left, right
                         ratio = -math.log((alpha + bends - 1) / (beta + free - bends))
                         ratio += math.log(bends * (bends - 1.0) * ways) - math.log((bends - 1.0) * reach * reach)
+                        ratio += share[x] - share[left] - share[right]
         elif n > burn // 4:  # another roughness; first the corners have to settle
             to = int(rng.random() * len(evidence))
             if to != level:

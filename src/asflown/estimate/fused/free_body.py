@@ -50,17 +50,17 @@ class FreeLevels(Levels):
 class FreeBody(Body):
     """A body whose actuators are only read."""
 
-    STATES: ClassVar[int] = _STATES
     RATE: ClassVar[int] = _RATE
     STORED: ClassVar[int] = _STORED
     # lengths of a torque: from a thruster's seconds to an orbit
     SPREAD: ClassVar[tuple[float, ...]] = (1.5, 1.2, 0.7, 0.7, 1.5, 1.0, 1.0, 1.0, 1.0, 1.0, 1.5)
-    # A likelihood of 1e4 and more is rounded to 1e-7 (gains are reused): the usual step of 1e-8 measures noise, and of
-    # ten levels the search stops anywhere.
-    SEARCH: ClassVar[tuple[float, ...]] = (1e-3, 1e-4, 1e-6)
     # A channel's scale is not in the channel: regressed on its own smoothed self it would shrink towards nothing,
     # the more so the longer the record.
     NARROWS: ClassVar[bool] = False
+
+    @property
+    def states(self) -> int:
+        return _STATES
 
     def control(self, v: FreeLevels) -> np.ndarray:
         """The actuators' torque on the body per unit inertia, (n,), of the states."""

@@ -29,12 +29,13 @@ from ...kit.smoother import smooth
 from ...telemetry.channels import AXES
 from ..subject import INERTIA_SHARE, SPIN_SHARE, Grid, Subject
 from .body import AxisData, Body, Known
-from .corners import COARSEST_S, draw_torques, spacing_s
+from .corners import all_candidates, draw_torques
 from .free_body import FreeBody
 from .gather import CannotFuse, Record, gather, needed
 from .held_body import HeldBody
 from .innovations import Innovations, by_channel, considered_doubts, innovation_doubts
-from .levels import AxisFit, fit_doubts, fit_levels
+from .levels import AxisFit, fit_doubts, fit_levels, unfitted
+from .series import MOMENTUM
 from .smooth_torque import gaussian_torque, widened
 from .turning import COMMAND_SMOOTHED, CommandNotKnown, check_turn
 
@@ -52,12 +53,9 @@ CONSIDERED = {
 #: Torques drawn from the posterior.
 PATHS = 400
 _SEED = 20160913
+#: Directions of the inertia's uncertainty that move the torque by less than this share of the largest are left out.
+_COUNTS = 1e-3
 
-TOO_LONG_FOR_CORNERS = Kind(
-    "fused.too-long-for-corners", Severity.NOTE,
-    "the record of {duration_s:.0f} s is too long to look for corners in: a smooth torque is taken, which rounds sharp peaks",
-    "Narrow the window with --start and --stop.",
-)  # fmt: skip
 NOT_ALL_AXES = Kind(
     "fused.gyroscopic-not-taken-off", Severity.CAUTION,
     "w x H and the products of inertia are not taken off, since not all axes have body rates: they are in the torque",
@@ -73,6 +71,17 @@ CORNERS_DO_NOT_EXPLAIN = Kind(
     "fused.corners-do-not-explain", Severity.CAUTION,
     "straight lines between corners do not explain the torque about {axis}: a smooth torque is taken instead",
 )  # fmt: skip
+
+
+CHAINS_APART = Kind(
+    "fused.chains-apart", Severity.SUSPECT,
+    "the chains that look for corners about {axis} do not agree (R-hat {r_hat:.2f}, {draws:.0f} effective draws): other corners "
+    "explain the data as well, and the band is widened by that",
+    "Use --prior matern to see a smooth torque, or narrow the window with --start and --stop.",
+)  # fmt: skip
+#: Chains do not agree above this R-hat, or with fewer effective draws.  With the few hundred of a usual event the largest R-hat of many
+#: instants is above 1.01 by chance; below this its share of the band is a few percent.
+_APART, _FEW = 1.1, 40
 
 
 @dataclass(frozen=True)
@@ -126,29 +135,63 @@ class _Motion:
 class _Coupling:
     """What a model of one axis leaves out, on the grid, (M, 3): w x H and the products of inertia's torque.
 
-    ``variance``: of w x H, by the rates' uncertainty; that of H does not matter."""
+    ``variance``: of w x H, by the rates' uncertainty; that of H does not matter.  ``unsure_Nm``: (M, 3, K), by what it is off for one
+    sigma of each element of the inertia.  ``beside_Nm``: (3,), one sigma of what the actuators do beside the law."""
 
     torque_Nm: np.ndarray
     variance: np.ndarray
     momentum_Nms: np.ndarray
+    unsure_Nm: np.ndarray
+    beside_Nm: np.ndarray
 
     @classmethod
-    def of(cls, motion: _Motion, I_B: np.ndarray, command: Command | None = None, *, whole: bool) -> _Coupling:
-        """``whole``: all axes' motion is known; else no torque is taken off."""
+    def of(
+        cls, motion: _Motion, I_B: np.ndarray, share: float, command: Command | None = None, *, whole: bool
+    ) -> _Coupling:
+        """``share``: one sigma of the inertia; ``whole``: all axes' motion is known; else no torque is taken off."""
         H = motion.rate @ I_B + motion.stored_Nms
-        torque = np.zeros_like(H)
+        torque, unsure = np.zeros_like(H), np.zeros((*H.shape, 0))
         if whole:
             torque = motion.acceleration @ (I_B - np.diag(np.diag(I_B))) + np.cross(motion.rate, H)
+            unsure = _by_inertia(motion, I_B, share)
         variance = motion.rate_variance @ (np.mean(H**2, axis=0) * (1 - np.eye(3)))
+        beside = np.zeros(3)
         if command is not None:
             variance = variance + command.variance[1] * np.diag(I_B) ** 2
             torque += command.acceleration * np.diag(I_B) - command.feed_Nm
-        return cls(torque, variance, H)
+            beside = command.beside_Nm
+        return cls(torque, variance, H, unsure, beside)
 
     def known(self, grid: Grid, j: int) -> Known | None:
         """The torque about an axis that has to be taken off first; None for none."""
         column = self.torque_Nm[:, j]
         return (lambda t: -np.interp(t, grid.seconds, column)) if np.any(column) else None
+
+    def considered(self, grid: Grid, j: int, axis: AxisData) -> np.ndarray:
+        """What one sigma of each thing that the coupling takes as known does to an axis's measurements, (M, K)."""
+        left, size, _ = np.linalg.svd(self.unsure_Nm[:, j], full_matrices=False)  # a hold's are all alike: one will do
+        counts = size > _COUNTS * size.max(initial=0.0)
+        torques = (left * size)[:, counts].T
+        moved = [axis.response(np.interp(axis.times.seconds, grid.seconds, c)) for c in torques]
+        if self.beside_Nm[j] > 0:  # in the momentum as well as in the torque: hardly any of it is in the sum
+            wheels = np.where(axis.channel == MOMENTUM, axis.measured_s - axis.start_s, 0.0)
+            moved.append(self.beside_Nm[j] * (wheels - axis.response(np.ones(len(axis.times.seconds)))))
+        return np.column_stack(moved) if moved else axis.columns
+
+
+def _by_inertia(motion: _Motion, I_B: np.ndarray, share: float) -> np.ndarray:
+    """By what the coupling torque (M, 3, 6) is off for one sigma of each element of the inertia.
+
+    Principal moments are off by the share, principal axes by as many radians: a product by the share of the moments' difference.
+    What a moment does to its own axis's acceleration is the axis's own (``Body.sensitivities``)."""
+    found = []
+    for a in range(3):
+        for b in range(a, 3):
+            E = np.zeros((3, 3))
+            E[a, b] = E[b, a] = share * (I_B[a, a] if a == b else np.hypot(I_B[a, a] - I_B[b, b], I_B[a, b]))
+            turned = np.cross(motion.rate, motion.rate @ E)
+            found.append(turned if a == b else turned + motion.acceleration @ E)
+    return np.stack(found, axis=2)
 
 
 def fused(
@@ -162,12 +205,11 @@ def fused(
 ) -> Fusion:
     """The torque about some axes.
 
-    ``prior``: one of PRIORS, or None: edges, but matern in a record too long for it.  ``loop``: one of
+    ``prior``: one of PRIORS, or None: edges.  ``loop``: one of
     ``gather.LOOPS``, or None: modelled where that is possible and explains the data no worse than measured.
     ``considered``: sigmas in place of some of CONSIDERED.
 
-    Raises CannotFuse where body rates, actuators or inertia are missing and what ``gather`` raises, BadInput for edges in a
-    record of more than 100 minutes (at 1 s)."""
+    Raises CannotFuse where body rates, actuators or inertia are missing and what ``gather`` raises."""
     with needed():
         subject.known_inertia()
     sizes = CONSIDERED | {"inertia": subject.inertia_share} | (considered or {})
@@ -189,13 +231,16 @@ def _fused(
     subject: Subject, record: Record, axes, prior: str | None, considered: dict[str, float], seed: int
 ) -> Fusion:
     I_B, grid = subject.known_inertia(), record.grid
-    prior, too_long = _prior_for(grid, prior)
+    prior = prior or "edges"
     bodies = {j: _body(subject, record, j, wiener=prior == "wiener") for j in record.series}
+    whole, still = len(bodies) == 3, record.loop == "modelled" and record.command is None
+    if still:  # a turn that counts is seen before the levels are fitted, and need not be fitted twice
+        _check_turn(record, _motion(bodies, {j: unfitted(bodies[j], record.series[j]) for j in bodies}, record), I_B)
     fits = {j: fit_levels(bodies[j], record.series[j]) for j in bodies}
-    motion, whole = _motion(bodies, fits, record), len(bodies) == 3
-    if record.loop == "modelled" and record.command is None:
-        check_turn(record.series, motion.rate, I_B, motion.stored_Nms, motion.torque_sigma_Nm)
-    coupling = _Coupling.of(motion, I_B, record.command, whole=whole)
+    motion = _motion(bodies, fits, record)
+    if still:
+        _check_turn(record, motion, I_B)
+    coupling = _Coupling.of(motion, I_B, considered["inertia"], record.command, whole=whole)
     if whole and not record.together:
         fits = _carried(subject, axes, record, motion, fits)
     seeds = np.random.default_rng(seed).spawn(3)
@@ -203,10 +248,10 @@ def _fused(
     solved = {}
     for j in axes:
         axis = AxisData.of(bodies[j], fits[j].levels, fits[j].series, fine.seconds)
-        solved[j] = _solve(axis, coupling.known(grid, j), prior, considered, AXES[j], seeds[j])
+        solved[j] = _solve(axis, coupling, grid, prior, considered, j, seeds[j])
     torque, sigma, momentum, paths = _columns_of(solved, grid, fine, coupling)
     unexplained = Doubts(d for s in solved.values() for d in s.unexplained)
-    found = [too_long, None if whole else NOT_ALL_AXES()]
+    found = [None if whole else NOT_ALL_AXES()]
     for j, s in solved.items():
         found += [*fit_doubts(AXES[j], fits[j]), *s.doubts]
     start_s = float(grid.from_epoch(subject.telemetry)[0])
@@ -222,6 +267,10 @@ def _fused(
     )  # fmt: skip
 
 
+def _check_turn(record: Record, motion: _Motion, I_B: np.ndarray) -> None:
+    check_turn(record.series, motion.rate, I_B, motion.stored_Nms, motion.torque_sigma_Nm)
+
+
 def _followed(command: Command | None) -> dict:
     if command is None:
         return {}
@@ -229,22 +278,9 @@ def _followed(command: Command | None) -> dict:
     return {"command": command.source, "feed_forward": fed}
 
 
-def _prior_for(grid: Grid, prior: str | None) -> tuple[str, Doubt | None]:
-    """The prior to take; the doubt that the default would be another in a shorter record."""
-    duration = float(grid.seconds[-1])
-    if spacing_s(duration, grid.step_s) <= max(COARSEST_S, grid.step_s):
-        return prior or "edges", None
-    if prior == "edges":
-        raise BadInput(
-            f"the record of {duration:.0f} s is too long to look for corners in",
-            remedy="Narrow it with --start and --stop, or use --prior matern.",
-        )
-    return prior or "matern", None if prior else TOO_LONG_FOR_CORNERS(duration_s=duration)
-
-
 def _finer(grid: Grid, prior: str) -> Grid:
     """The grid of candidate corners: twice as fine where the record is short enough, since a true one lies between two."""
-    if prior != "edges" or spacing_s(float(grid.seconds[-1]), grid.step_s / 2) > grid.step_s / 2 * (1 + 1e-9):
+    if prior != "edges" or not all_candidates(2 * grid.count - 1):
         return grid
     return Grid(grid.start_ns, grid.step_s / 2, 2 * grid.count - 1)
 
@@ -306,11 +342,13 @@ def _carried(subject: Subject, axes, record: Record, motion: _Motion, fits: dict
 
 
 def _solve(
-    whole: AxisData, known: Known | None, prior: str, considered: dict[str, float], name: str, rng: np.random.Generator
-) -> _Solved:
-    """The torque of one axis at the wanted instants; ``known``: a torque to take off first."""
-    sizes, columns = _sensitivities(whole, considered)
-    axis = whole.without_known(known)
+    whole: AxisData, coupling: _Coupling, grid: Grid, prior: str, considered: dict[str, float], j: int,
+    rng: np.random.Generator,
+) -> _Solved:  # fmt: skip
+    """The torque of axis ``j`` at the wanted instants, the coupling to other axes taken off first."""
+    name, axis = AXES[j], whole.without_known(coupling.known(grid, j))
+    sizes, columns = _sensitivities(whole, axis, considered)
+    columns = np.column_stack([columns, coupling.considered(grid, j, whole)])
     learnt = replace(axis, columns=columns if axis.body.NARROWS else columns[:, :0])
     doubts: list[Doubt] = []
     post = draw_torques(learnt, PATHS, rng) if prior == "edges" else None
@@ -325,21 +363,33 @@ def _solve(
         raise _not_fitted()
     innovations = by_channel(post.whitened, axis.channel)
     off = {
-        n: (s * float(c.mean()), s * float(c.std())) for (n, s), c in zip(sizes.items(), post.considered.T, strict=True)
+        n: (s * float(c.mean()), s * float(c.std())) for (n, s), c in zip(sizes.items(), post.considered.T, strict=False)
     }
     unexplained = innovation_doubts(name, innovations)
-    doubts += unexplained + considered_doubts(name, sizes, post.considered)
+    doubts += unexplained + considered_doubts(name, sizes, post.considered) + _apart(name, post.settings)
     wanted = axis.times.wanted
     return _Solved(
         post.mean[wanted], post.paths[:, wanted], post.peak_scale, off, innovations, unexplained, post.settings, doubts, learnt
     )  # fmt: skip
 
 
-def _sensitivities(axis: AxisData, considered: dict[str, float]) -> tuple[dict[str, float], np.ndarray]:
-    """Sigmas by name, and sensitivities (M, P) of one sigma each, of what is taken as known and moves these measurements."""
-    found = axis.body.sensitivities(axis, smooth(axis.model, axis.data))
+def _apart(name: str, found: dict) -> list[Doubt]:
+    """Whether chains, if there were any, lie apart."""
+    draws = min(found.get("effective_bulk", np.inf), found.get("effective_tail", np.inf))
+    if found.get("r_hat", 1.0) <= _APART and draws >= _FEW:
+        return []
+    return [CHAINS_APART(axis=name, r_hat=found["r_hat"], draws=draws)]
+
+
+def _sensitivities(whole: AxisData, axis: AxisData, considered: dict[str, float]) -> tuple[dict[str, float], np.ndarray]:
+    """Sigmas by name, and sensitivities (M, P) of one sigma each, of what is taken as known and moves these measurements.
+
+    ``axis``: less the coupling, ``whole``: with it.  The wheels' scale is in w x H as in their momentum: it counts by the torque alone."""
+    found = whole.body.sensitivities(whole, smooth(whole.model, whole.data))
+    if axis is not whole and considered["spin_inertia"] > 0:
+        found["spin_inertia"] = axis.body.sensitivities(axis, smooth(axis.model, axis.data))["spin_inertia"]
     names = [n for n, column in found.items() if considered[n] > 0 and np.any(column)]
-    columns = np.column_stack([considered[n] * found[n] for n in names] or [axis.columns])
+    columns = np.column_stack([considered[n] * found[n] for n in names] or [whole.columns])
     return {n: considered[n] for n in names}, columns
 
 

@@ -77,9 +77,9 @@ _NAMES = {
 
 
 def considered_doubts(axis: str, considered: dict[str, float], drawn: np.ndarray) -> list[Doubt]:
-    """Where the data contradict what was taken as known; ``drawn``: (K, P), in units of each one's sigma."""
+    """Where the data contradict what was taken as known; ``drawn``: (K, P), in units of each one's sigma, these first."""
     doubts = []
-    for (name, sigma), column in zip(considered.items(), drawn.T, strict=True):
+    for (name, sigma), column in zip(considered.items(), drawn.T, strict=False):
         mean, spread = float(column.mean()), float(column.std())
         if abs(mean) < _FAR_OFF or spread > 0.8:
             continue

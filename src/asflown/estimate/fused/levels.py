@@ -12,7 +12,7 @@ import numpy as np
 from scipy import optimize
 
 from ...kit.doubts import Doubt, Kind, Severity
-from ...kit.smoother import log_likelihood, smooth
+from ...kit.smoother import log_likelihood, score, smooth
 from .body import AxisData, Body, Known, Levels
 from .series import ROWS, Series, step_of
 
@@ -26,6 +26,12 @@ _SURE, _WORTH_S = 4.0, 0.2
 _REACH_S = 3.0
 #: Samples of a long record that the levels are fitted to, in blocks spread evenly over it.
 _MOST_FITTED, _BLOCKS = 9000, 3
+#: Steps of a level's logarithm: of the model's matrices, where rounding is the only limit, and of the likelihood itself.
+_STEP, _WIDE_STEP = 1e-6, 1e-3
+#: Where the search of levels ends: a gain below a share of the likelihood that is no thousandth of one in a usual record.
+_ENDS = {"maxiter": 100, "ftol": 1e-8, "gtol": 1e-2}
+#: The cost of levels under which the record cannot be.
+_IMPOSSIBLE = 1e10
 
 TIMES_SHIFTED = Kind(
     "fused.times-shifted", Severity.CAUTION,
@@ -78,6 +84,11 @@ def fit_levels(body: Body, series: list[Series], known: Known | None = None) -> 
     return AxisFit(levels, tuple(series), count - sum(len(s.values) for s in series), offsets)
 
 
+def unfitted(body: Body, series: list[Series]) -> AxisFit:
+    """At levels from the series alone."""
+    return AxisFit(body.starting_levels(series), tuple(series), 0, {})
+
+
 def _without_outliers(body: Body, levels: Levels, series, known: Known | None, limit: float):
     """The series less what lies beyond ``limit``, worst first; as they are where there is nothing, or too much."""
     kept, most = series, _MOST_OUTLYING * sum(len(s.values) for s in series)
@@ -96,10 +107,11 @@ def _without_outliers(body: Body, levels: Levels, series, known: Known | None, l
 
 def _worst(alone: np.ndarray, at_s: np.ndarray, limit: float) -> np.ndarray:
     """Measurements beyond the limit, none near a worse one."""
-    chosen: list[int] = []
-    for i in np.flatnonzero(alone > limit)[np.argsort(-alone[alone > limit])]:
-        if all(abs(at_s[i] - at_s[c]) > _NEIGHBOURS_S for c in chosen):
-            chosen.append(int(i))
+    left, chosen = np.flatnonzero(alone > limit), []
+    while len(left):
+        worst = left[np.argmax(alone[left])]
+        chosen.append(worst)
+        left = left[np.abs(at_s[left] - at_s[worst]) > _NEIGHBOURS_S]
     return np.array(chosen, int)
 
 
@@ -107,16 +119,39 @@ def _most_probable(body: Body, centre: Levels, start: Levels, series, known: Kno
     kind, middle, spread = type(centre), centre.logs(), np.array(body.SPREAD)
     blocks = [AxisData.of(body, start, part).without_known(known) for part in _blocks(series)]
 
-    def cost(p):
-        levels = kind.from_logs(p)
-        value = sum(log_likelihood(body.smooth_model(levels, block.times), block.data) for block in blocks)
-        return (-value if np.isfinite(value) else 1e10) + 0.5 * np.sum(((p - middle) / spread) ** 2)
+    def cost(z):
+        """Of levels z prior sigmas from the middle, with its gradient."""
+        p = middle + spread * z
+        values, slopes = zip(*(_likelihood(body, kind, p, block) for block in blocks), strict=True)
+        value, slope = sum(values), np.sum(slopes, axis=0)
+        if not (np.isfinite(value) and np.isfinite(slope).all()):
+            return _IMPOSSIBLE, np.zeros_like(z)
+        return -value + 0.5 * z @ z, z - spread * slope
 
-    bounds = list(zip(middle - 4 * spread, middle + 4 * spread, strict=True))
-    p = start.logs()
-    for step in body.SEARCH:
-        p = optimize.minimize(cost, p, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60, "eps": step}).x
-    return kind.from_logs(p)
+    z = (start.logs() - middle) / spread
+    found = optimize.minimize(cost, z, method="L-BFGS-B", jac=True, bounds=[(-6.0, 6.0)] * len(z), options=_ENDS)
+    return kind.from_logs(middle + spread * found.x)
+
+
+def _likelihood(body: Body, kind: type[Levels], p: np.ndarray, block: AxisData) -> tuple[float, np.ndarray]:
+    """Log likelihood of a block and its derivative by the levels' logarithms."""
+
+    def model(q):
+        return body.smooth_model(kind.from_logs(q), block.times)
+
+    here, used = model(p), np.unique(block.data.row)
+    found, slope = score(here, block.data), np.empty(len(p))
+    for k in range(len(p)):
+        step = np.zeros(len(p))
+        step[k] = _STEP
+        there = model(p + step)
+        if np.array_equal(there.H[used], here.H[used]):
+            slope[k] = found.along(here, there) / _STEP
+        else:  # the score is not taken by H
+            wide = step * (_WIDE_STEP / _STEP)
+            sides = [log_likelihood(model(p + s), block.data) for s in (wide, -wide)]
+            slope[k] = (sides[0] - sides[1]) / (2 * _WIDE_STEP)
+    return found.log_likelihood, slope
 
 
 def _blocks(series) -> list[list[Series]]:
