@@ -46,6 +46,8 @@ BEND_FREEDOM = 1.0
 _CORNER_PRIOR = (1.0, 60.0)
 #: Most instants that are all candidates; in a longer record those near suspect instants are, and so many others.
 _CANDIDATES, _COARSE = 1200, 60
+#: A torque whose fitted length is above this is slow, with edges in it; a faster one is made of excursions, which lines suit. [s]
+_SLOW_S = 60.0
 #: Lengths of the ramps in a long record [s]: a bend for each end, of a size of its own, would have them long, whatever the data
 #: say (by the cube of the length).  Edges are steps, or a shadow's penumbra of seconds.
 _RAMPS_S = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
@@ -232,11 +234,11 @@ class _Search:
 def draw_torques(axis: AxisData, count: int, rng: Generator) -> Posterior:
     """The posterior of corners, bends and roughness at the axis's levels.
 
-    In a long record corners are looked for near suspect instants, beside a smooth torque of the levels between the edges
-    (``suspects``).  Where the first draws do not explain the data as well as a smooth torque does, the sampler is given ten times
+    In a long record, and where the torque is slow, ramps are looked for near suspect instants, beside a smooth torque of the levels
+    between the edges (``suspects``).  Where the first draws do not explain the data as well as a smooth torque does, the sampler is given ten times
     as many proposals; ``Posterior.explained`` says whether they did in the end."""
     wanted = axis.times.seconds[axis.times.wanted]
-    if not all_candidates(len(wanted)):
+    if not all_candidates(len(wanted)) or axis.levels.length_s > _SLOW_S:
         return _in_long(axis, wanted, count, rng)
     search = _Search.of_bends(axis, wanted, rng)
     ways, found = _ways(search, count)
@@ -261,7 +263,7 @@ def draw_torques(axis: AxisData, count: int, rng: Generator) -> Posterior:
 
 
 def _in_long(axis: AxisData, wanted: np.ndarray, count: int, rng: Generator) -> Posterior:
-    """As ``draw_torques``, of a record with more instants than candidates can be."""
+    """As ``draw_torques``, of a slow torque, or of a record with more instants than candidates can be."""
     found = suspects(axis)
     at, length, each = _ramps(found, wanted)
     search = _Search.of_ramps(replace(axis, levels=found.levels), at, length, each, rng)

@@ -346,7 +346,7 @@ def _solve(
 ) -> _Solved:  # fmt: skip
     """The torque of axis ``j`` at the wanted instants, the coupling to other axes taken off first."""
     name, axis = AXES[j], whole.without_known(coupling.known(grid, j))
-    sizes, columns = _sensitivities(whole, considered)
+    sizes, columns = _sensitivities(whole, axis, considered)
     columns = np.column_stack([columns, coupling.considered(grid, j, whole)])
     learnt = replace(axis, columns=columns if axis.body.NARROWS else columns[:, :0])
     doubts: list[Doubt] = []
@@ -380,11 +380,15 @@ def _apart(name: str, found: dict) -> list[Doubt]:
     return [CHAINS_APART(axis=name, r_hat=found["r_hat"], draws=draws)]
 
 
-def _sensitivities(axis: AxisData, considered: dict[str, float]) -> tuple[dict[str, float], np.ndarray]:
-    """Sigmas by name, and sensitivities (M, P) of one sigma each, of what is taken as known and moves these measurements."""
-    found = axis.body.sensitivities(axis, smooth(axis.model, axis.data))
+def _sensitivities(whole: AxisData, axis: AxisData, considered: dict[str, float]) -> tuple[dict[str, float], np.ndarray]:
+    """Sigmas by name, and sensitivities (M, P) of one sigma each, of what is taken as known and moves these measurements.
+
+    ``axis``: less the coupling, ``whole``: with it.  The wheels' scale is in w x H as in their momentum: it counts by the torque alone."""
+    found = whole.body.sensitivities(whole, smooth(whole.model, whole.data))
+    if axis is not whole and considered["spin_inertia"] > 0:
+        found["spin_inertia"] = axis.body.sensitivities(axis, smooth(axis.model, axis.data))["spin_inertia"]
     names = [n for n, column in found.items() if considered[n] > 0 and np.any(column)]
-    columns = np.column_stack([considered[n] * found[n] for n in names] or [axis.columns])
+    columns = np.column_stack([considered[n] * found[n] for n in names] or [whole.columns])
     return {n: considered[n] for n in names}, columns
 
 

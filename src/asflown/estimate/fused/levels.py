@@ -139,13 +139,13 @@ def _likelihood(body: Body, kind: type[Levels], p: np.ndarray, block: AxisData) 
     def model(q):
         return body.smooth_model(kind.from_logs(q), block.times)
 
-    here = model(p)
+    here, used = model(p), np.unique(block.data.row)
     found, slope = score(here, block.data), np.empty(len(p))
     for k in range(len(p)):
         step = np.zeros(len(p))
         step[k] = _STEP
         there = model(p + step)
-        if np.array_equal(there.H, here.H):
+        if np.array_equal(there.H[used], here.H[used]):
             slope[k] = found.along(here, there) / _STEP
         else:  # the score is not taken by H
             wide = step * (_WIDE_STEP / _STEP)

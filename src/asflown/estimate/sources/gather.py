@@ -91,6 +91,7 @@ class Arc:
     step_s: float
     environment: Environment
     doubts: Doubts
+    own_harmonics: bool = False  # drag's harmonics are of each axis' own
 
     @property
     def phase(self) -> np.ndarray | None:
@@ -169,7 +170,8 @@ def with_harmonics(arc: Arc, drag: np.ndarray, *, modelled: bool) -> Arc:
     grown = cumulative_trapezoid(arc.turn @ torque, arc.time_s, axis=0, initial=0)
     columns = tuple(Column("", f"{DENSITY} {k}", "", 1.0) for k in range(torque.shape[2]))
     Z = np.concatenate([arc.Z, np.swapaxes(arc.turn, 1, 2) @ grown], axis=2)
-    return replace(arc, Z=Z, columns=(*arc.columns, *columns), torque=np.concatenate([arc.torque, torque], axis=2))
+    whole = np.concatenate([arc.torque, torque], axis=2)
+    return replace(arc, Z=Z, columns=(*arc.columns, *columns), torque=whole, own_harmonics=drag.shape[2] > 1)
 
 
 class _Means:
