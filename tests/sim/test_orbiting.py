@@ -406,6 +406,7 @@ BAD = {
     "no rods": ("quiet", {"unloading": {"gain": "1e-3 1/s"}, "orbit": {"semi_major_axis": "7000 km"}}, "no torque rods"),
     "not described": ("quiet", {"environment": {"dipole": True}, "orbit": {"semi_major_axis": "7000 km"}}, "not described"),
     "an unknown wheel": ("leo-nadir", {"wheel_drag": {"RW9": {"coulomb": "1 mN m"}}}, "RW9"),
+    "a gyro too noisy for its estimate": ("leo-nadir", {"sensors": {"gyro": "50 urad/s"}}, "gyro's noise alone"),
     "an impossible body": ("leo-nadir", {"inertia": "1 1 9 0 0 0 kg m2"}, "no rigid body"),
 }  # fmt: skip
 
