@@ -47,8 +47,8 @@ def day() -> tuple[Model, Measurements]:
 
 
 def process_noise(model: Model) -> np.ndarray:
-    """Of every step: all are of one length here, and the torque of one size."""
-    return model.Q[0] + model.scale[0, 0] * model.driven[0, 0]
+    """Of every step: all are of one length here."""
+    return model.Q[0]
 
 
 def peer(model: Model, data: Measurements) -> kalman_smoother.KalmanSmoother:

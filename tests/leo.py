@@ -84,13 +84,17 @@ def craft(folder: Path, name: str = "nadir-eclipse", **described):
 # ---- the nadir hold -------------------------------------------------------------------------------------------
 
 
-def record(folder, name="nadir-eclipse", start_s=0.0, stop_s=np.inf, without=(), commanded=None):
-    """A window of the record; ``without``: stems left out; ``commanded``: rates (N, 3) [rad/s] of the times, as a channel."""
+def record(folder, name="nadir-eclipse", start_s=0.0, stop_s=np.inf, without=(), commanded=None, orbit=False):
+    """A window of the record; ``without``: stems left out; ``commanded``: rates (N, 3) [rad/s] of the times, as a channel;
+    ``orbit``: with positions and velocities."""
     lines = rows(name)
     columns = {f"wheel_rate_{w} [rpm]": f"{w}_SPD" for w in said(name)["told"]["wheels"]}
     columns |= {f"body_rate_{a} [deg/s]": f"GYR_{a.upper()}" for a in "xyz"}
     columns |= {f"attitude_error_{a} [deg]": f"ATT_ERR_{a.upper()}" for a in "xyz"}
     columns |= {f"quaternion_{c} []": f"ADCS_Q{i}" for c, i in zip("xyzw", (1, 2, 3, 4), strict=True)}
+    if orbit:
+        columns |= {f"orbit_position_{a} [km]": f"POS_{a.upper()}" for a in "xyz"}
+        columns |= {f"orbit_velocity_{a} [km/s]": f"VEL_{a.upper()}" for a in "xyz"}
     kept = {k: v for k, v in columns.items() if not k.startswith(tuple(without))}
     t = seconds(name)
     use = np.flatnonzero((t >= start_s) & (t <= stop_s))

@@ -63,7 +63,9 @@ def orbit(f: Flight, t):
     u = np.radians(f.argument_deg) + np.sqrt(MU / r**3) * t
     turn = Rotation.from_euler("ZX", np.radians([f.node_deg, f.inclination_deg]))
     speed = np.sqrt(MU / r)
-    return r * turn.apply(np.stack([np.cos(u), np.sin(u), 0 * u], 1)), speed * turn.apply(np.stack([-np.sin(u), np.cos(u), 0 * u], 1))
+    return r * turn.apply(np.stack([np.cos(u), np.sin(u), 0 * u], 1)), speed * turn.apply(
+        np.stack([-np.sin(u), np.cos(u), 0 * u], 1)
+    )
 
 
 def field_N(r):
@@ -101,13 +103,18 @@ def torques(f: Flight, t, r, v, q):
     lit = light(r, np.array(f.sun))
     n = np.sqrt(MU / (R_EARTH + f.height_m) ** 3)
     rho = 1 + f.swing * np.cos(n * t - f.swing_phase) + f.second * np.cos(2 * n * t + 1)
-    return {
-        "gravity-gradient": 3 * MU / (R_EARTH + f.height_m) ** 5 * np.cross(r_B, r_B @ INERTIA),
-        "dipole": np.cross(f.dipole, B),
-        "sunlight": lit[:, None] * np.cross(f.sunlight, s),
-        "drag": rho[:, None] * np.cross(f.drag, w),
-        "constant": np.tile(f.constant, (len(r), 1)),
-    }, B, s, lit
+    return (
+        {
+            "gravity-gradient": 3 * MU / (R_EARTH + f.height_m) ** 5 * np.cross(r_B, r_B @ INERTIA),
+            "dipole": np.cross(f.dipole, B),
+            "sunlight": lit[:, None] * np.cross(f.sunlight, s),
+            "drag": rho[:, None] * np.cross(f.drag, w),
+            "constant": np.tile(f.constant, (len(r), 1)),
+        },
+        B,
+        s,
+        lit,
+    )
 
 
 def fly(f: Flight):
@@ -151,9 +158,21 @@ def craft_of(inertia, more: str = ""):
 
     I = inertia  # noqa: E741
     six = " ".join(f"{v:.8g}" for v in (I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]))
-    text = ['name = "orbiter"', "[[mass_properties]]", 'date = "2026-01-01"', 'piece = "flight"', 'basis = "estimated"', f'inertia = "{six} kg m2"']
+    text = [
+        'name = "orbiter"',
+        "[[mass_properties]]",
+        'date = "2026-01-01"',
+        'piece = "flight"',
+        'basis = "estimated"',
+        f'inertia = "{six} kg m2"',
+    ]
     for k, axis in enumerate(AXES4):
-        text += ["[[wheels]]", f'name = "RW{k + 1}"', 'axis = "{:.12f} {:.12f} {:.12f}"'.format(*axis), f'spin_inertia = "{SPIN} kg m2"']
+        text += [
+            "[[wheels]]",
+            f'name = "RW{k + 1}"',
+            'axis = "{:.12f} {:.12f} {:.12f}"'.format(*axis),
+            f'spin_inertia = "{SPIN} kg m2"',
+        ]
     path = Path(mkdtemp()) / "orbiter.toml"
     path.write_text("\n".join(text) + "\n" + more)
     return load_craft(str(path))

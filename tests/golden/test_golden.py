@@ -27,6 +27,7 @@ TEXTS = {
     "inertia-plan": ["inertia", "plan", "slews.csv", "--craft", "cassini"],
     "inertia-history": ["inertia", "history", "--craft", "cassini"],
     "external-torque": ["external-torque", "t.csv", "--craft", "cassini"],
+    "sources": ["sources", "leo-nadir.csv", "--craft", "pyramid"],
     "leak": ["leak", "t.csv", "--cm", "0,0,1.35", "--stop", "180", "--craft", "cassini"],
     "thrust": ["thrust", "wheel-bias-day28.csv", "--cm", "0,0,1.35", "--method", "printed", "--craft", "cassini"],
     "density": ["density", "t.csv", "--flyby", "E3", "--closest-approach", "200", "--axis", "y", "--arm", "0.9 m",

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asflown.kit.smoother import Measurements, Model, discretize, forward, log_likelihood, smooth
+from asflown.kit.smoother import Measurements, Model, discretize, forward, log_likelihood, score, smooth
 
 
 def problem(seed, n=4, steps=25, drives=1):
@@ -177,3 +177,30 @@ def test_law_each_measurement_against_all_the_others():
         at = slice(step[i] * n, (step[i] + 1) * n)
         sigma = np.sqrt(h @ covariance[at, at] @ h + model.R[data.row[i]])
         assert s.alone[i] == pytest.approx((data.value[i] - h @ mean[at]) / sigma, rel=1e-8)
+
+
+@pytest.mark.parametrize("steps", [25, 2000], ids=["full recursions", "gains that repeat"])
+def test_law_the_score_is_the_likelihoods_slope(steps):
+    """By A, Q, R and the first covariance, along a random direction of each."""
+    rng = np.random.default_rng(3)
+    model, data = problem(1, drives=0)
+    if steps > 25:  # every second step measured the same: both passes settle
+        start = np.arange(steps + 1)
+        model = replace(model, which=np.zeros(steps, int), scale=np.empty((steps, 0)))
+        data = Measurements(start, np.arange(steps) % 2, rng.normal(size=steps))
+    found = score(model, data)
+    assert found.log_likelihood == pytest.approx(log_likelihood(model, data), rel=1e-12)
+
+    def symmetric(shape):
+        x = rng.normal(size=shape)
+        return x + np.swapaxes(x, -1, -2)
+
+    for change in (
+        {"A": rng.normal(size=model.A.shape)}, {"Q": symmetric(model.Q.shape)}, {"R": rng.normal(size=2)},
+        {"covariance": symmetric(model.covariance.shape)},
+    ):  # fmt: skip
+        ((name, d),) = change.items()
+        step = 1e-6
+        sides = [replace(model, **{name: getattr(model, name) + s * step * d}) for s in (1, -1)]
+        slope = (log_likelihood(sides[0], data) - log_likelihood(sides[1], data)) / (2 * step)
+        assert found.along(sides[1], sides[0]) / (2 * step) == pytest.approx(slope, rel=1e-4, abs=1e-4), name

@@ -25,6 +25,11 @@ UNLIKE = typer.Option(
 )
 INERTIA_SIGMA = typer.Option(None, "--inertia-sigma", help="One sigma of the inertia, as a share; 0.01.")
 SPIN_SIGMA = typer.Option(None, "--spin-sigma", help="One sigma of a wheel's spin inertia, as a share; 0.0024.")
+AIR = typer.Option(
+    None,
+    "--air",
+    help='F10.7 of the day before, its 81-day mean and Ap, for NRLMSIS: "150,145,12"; else exponential.',
+)
 JSON = typer.Option(False, "--json", help="One JSON object on standard output.")
 
 
@@ -61,6 +66,26 @@ def numbers_of(text: str, option: str) -> list[float]:
         return [float(part) for part in text.split(",")]
     except ValueError:
         raise BadInput(f"{option} {text!r} is not a list of numbers", remedy='Write it as in "5,10,15".') from None
+
+
+def names_of(text: str | None) -> tuple[str, ...] | None:
+    """'drag,dipole' -> names; None for none."""
+    return None if text is None else tuple(n.strip() for n in text.split(",") if n.strip())
+
+
+def air_of(text: str | None):
+    """The Sun's flux and activity that --air gives, or None."""
+    from ..estimate.environment import Air
+    from ..kit.errors import BadInput
+
+    if text is None:
+        return None
+    three = numbers_of(text, "--air")
+    if len(three) != 3 or min(three) < 0:
+        raise BadInput(
+            f"--air {text!r} is not three numbers", remedy='Give F10.7, its 81-day mean and Ap: --air "150,145,12".'
+        )
+    return Air(*three)
 
 
 def hashes(*files) -> dict[str, str]:

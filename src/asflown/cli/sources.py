@@ -7,7 +7,9 @@ from pathlib import Path
 import typer
 
 from .job import Job
-from .options import CHANNELS, CRAFT, EXCLUDE, INERTIA, JSON, KEEP_AS, KEEP_IN, START, STOP, numbers_of
+from .options import (
+    AIR, CHANNELS, CRAFT, EXCLUDE, INERTIA, JSON, KEEP_AS, KEEP_IN, START, STOP, air_of, names_of,
+)  # fmt: skip
 
 
 def sources(
@@ -20,9 +22,7 @@ def sources(
         help="Those looked for, of dipole,sunlight,drag,constant; by default all whose vectors are known, the constant where needed.",
     ),
     without: str = typer.Option(None, "--without", help='Those left out, as in "constant,drag".'),
-    air: str = typer.Option(
-        None, "--air", help='F10.7 of the day before, its 81-day mean and Ap, for NRLMSIS: "150,145,12"; else exponential.'
-    ),
+    air: str = AIR,
     start: str = START,
     stop: str = STOP,
     channels: Path = CHANNELS,
@@ -30,14 +30,14 @@ def sources(
     inertia: str = INERTIA,
     store: str = KEEP_IN,
     name: str = KEEP_AS,
-    out: Path = typer.Option(None, "--out", help="Write contributions and torque over time (.csv, .parquet), or all (.json)."),
+    out: Path = typer.Option(
+        None, "--out", help="Write contributions and torque over time (.csv, .parquet), or all (.json)."
+    ),
     plot: Path = typer.Option(None, "--plot", help="Draw contributions, their sum and the residual (SVG, PNG or PDF)."),
     json: bool = JSON,
 ) -> None:
     """What the torque is made of: residual dipole, sunlight, drag, a constant torque, gravity gradient."""
-    from ..estimate.environment import Air
     from ..estimate.sources import sources as sources_of
-    from ..kit.errors import BadInput
 
     def entry(result, name):
         from ..trends.entries import sources_entry
@@ -45,16 +45,6 @@ def sources(
         return sources_entry(result, telemetry, job.craft, name)
 
     job = Job(context)
-    given = None
-    if air is not None:
-        three = numbers_of(air, "--air")
-        if len(three) != 3 or min(three) < 0:
-            raise BadInput(f"--air {air!r} is not three numbers", remedy='Give F10.7, its 81-day mean and Ap: --air "150,145,12".')
-        given = Air(*three)
     telemetry = job.telemetry()
-    result = sources_of(telemetry, job.craft, which=_names(sources), without=_names(without) or (), air=given)
+    result = sources_of(telemetry, job.craft, which=names_of(sources), without=names_of(without) or (), air=air_of(air))
     job.finish(result, entry=entry)
-
-
-def _names(text: str | None) -> tuple[str, ...] | None:
-    return None if text is None else tuple(n.strip() for n in text.split(",") if n.strip())

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from .job import Job
-from .options import CHANNELS, CM, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP
+from .options import AIR, CHANNELS, CM, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP, air_of, names_of
 from .output import say
 
 if TYPE_CHECKING:
@@ -45,6 +45,10 @@ def torque(
     consider: str = typer.Option(
         None, "--consider", help='One sigma of what the fused method takes as known, as in "inertia=0.03,delay_s=0.2".'
     ),
+    known: str = typer.Option(
+        None, "--with", help="Known torques taken off, some of gravity-gradient,sunlight,dipole,drag,rods."
+    ),
+    air: str = AIR,
     impulse: str = typer.Option(None, "--impulse", help='Angular impulse between two times [s], as in "60,141".'),
     moving: str = typer.Option("auto", "--moving", help="Mechanism whose inertia is taken off: a name, none, or auto."),
     compare: bool = typer.Option(False, "--compare", help="Compare the other methods with the chosen one."),
@@ -81,12 +85,14 @@ def torque(
     mechanism = None if moving == "none" else moving
     # seconds for an event, minutes for an orbit at 1 Hz: say that something happens, to a terminal only
     with Console(stderr=True).status("fitting and smoothing", spinner="line"):
-        result = torque_by(telemetry, craft_then, method=chosen, axis=axis, moving=mechanism)
+        result = torque_by(
+            telemetry, craft_then, method=chosen, axis=axis, moving=mechanism, known=names_of(known) or (), air=air_of(air)
+        )
     if impulse is not None:
         result = _with_impulse(result, impulse)
     comparisons = []
     if compare:
-        others = _others(telemetry, craft_then, result, mechanism)
+        others = _others(telemetry, craft_then, result, mechanism, known=names_of(known) or (), air=air_of(air))
         result = replace(result, compared=tuple(others))
         comparisons = [torque_comparison(result, o, "xyz"[j]) for o in others for j in result.axes]
     job.finish(
@@ -135,7 +141,7 @@ def _with_impulse(result: TorqueResult, text: str) -> TorqueResult:
     return result.with_impulse(*span)
 
 
-def _others(telemetry, craft, result: TorqueResult, mechanism: str | None) -> list[TorqueResult]:
+def _others(telemetry, craft, result: TorqueResult, mechanism: str | None, **off) -> list[TorqueResult]:
     """Every other method and variant that this telemetry allows."""
     from ..estimate.torque import torque as torque_by
     from ..kit.errors import BadInput
@@ -147,7 +153,7 @@ def _others(telemetry, craft, result: TorqueResult, mechanism: str | None) -> li
             continue
         try:
             found.append(
-                torque_by(telemetry, craft, method=method, variant=variant, axis=result.axis, moving=mechanism)
+                torque_by(telemetry, craft, method=method, variant=variant, axis=result.axis, moving=mechanism, **off)
             )
         except BadInput as why:
             say(f"not compared, {method} {variant}: {str(why).splitlines()[0]}")

@@ -71,9 +71,9 @@ def smoothed(g: Gains, values: np.ndarray, states) -> np.ndarray:
 def simulate(model: Model, data: Measurements, states, count: int, rng: np.random.Generator):
     """``count`` flights of a model from a start of mean zero: some states (N, S, K), and what is measured (M, K)."""
     steps, n = len(model.which), len(model.mean)
-    noise = np.einsum("krc,kcj->krj", _roots(model.Q)[model.which], rng.standard_normal((steps, n, count)))
+    noise = _roots(model.Q)[model.which] @ rng.standard_normal((steps, n, count))
     for j, D in enumerate(model.driven):
-        part = np.einsum("krc,kcj->krj", _roots(D)[model.which], rng.standard_normal((steps, n, count)))
+        part = _roots(D)[model.which] @ rng.standard_normal((steps, n, count))
         noise += np.sqrt(model.scale[:, j, None, None]) * part
     noise[0] = _roots(model.covariance[None])[0] @ rng.standard_normal((n, count))
     reading = np.sqrt(model.R[data.row])[:, None] * rng.standard_normal((len(data.row), count))

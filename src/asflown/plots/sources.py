@@ -8,20 +8,33 @@ import numpy as np
 
 from ..kit.digits import scaled_unit
 from ..telemetry.channels import AXES
-from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, breaks, new_figure, save, write_doubts
+from .figure import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, breaks, new_figure, save, write_doubts
 from .torque import time_scale
 
 if TYPE_CHECKING:
     from ..estimate.sources import SourcesResult
 
-_COLOURS = {"gravity-gradient": GREEN, "sunlight": ORANGE, "dipole": BLUE, "drag": PURPLE, "constant": SKY, "rods": GREY}
+_COLOURS = {
+    "gravity-gradient": GREEN,
+    "sunlight": ORANGE,
+    "dipole": BLUE,
+    "drag": PURPLE,
+    "constant": SKY,
+    "rods": GREY,
+}
 
 
 def draw_contributions(result: SourcesResult, ax, axis: int):
     """Each source's torque about one axis, their sum, and the torque estimated.  Returns ax."""
     factor, label, t, longest = _scales(result)
     _shade(result, ax)
-    ax.plot(*breaks(t, factor * result.torque_Nm[:, axis], longest), color=GREY, linewidth=3.0, alpha=0.45, label="estimated")
+    ax.plot(
+        *breaks(t, factor * result.torque_Nm[:, axis], longest),
+        color=GREY,
+        linewidth=3.0,
+        alpha=0.45,
+        label="estimated",
+    )
     for name, torque in result.contributions.items():
         ax.plot(*breaks(t, factor * torque[:, axis], longest), color=_COLOURS[name], linewidth=1.1, label=name)
     ax.plot(*breaks(t, factor * result.explained_Nm[:, axis], longest), color="black", linewidth=0.9, label="sum")
@@ -81,5 +94,6 @@ def _shade(result: SourcesResult, ax) -> None:
         return
     t = result.time_s / time_scale(result.time_s)[0]
     dark = np.r_[False, result.lit < 0.5, False].astype(int)
-    for a, b in zip(np.flatnonzero(np.diff(dark) > 0), np.flatnonzero(np.diff(dark) < 0), strict=True):
-        ax.axvspan(t[a], t[min(b, len(t)) - 1], color="#d9d9e6", linewidth=0, zorder=0)
+    starts, stops = np.flatnonzero(np.diff(dark) > 0), np.flatnonzero(np.diff(dark) < 0) - 1
+    for first, last in zip(t[starts], t[stops], strict=True):
+        ax.axvspan(first, last, color="#d9d9e6", linewidth=0, zorder=0)

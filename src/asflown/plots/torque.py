@@ -77,8 +77,9 @@ def save_torque_figure(result: TorqueResult, path) -> None:
             if np.isfinite(results[k].torque_Nm[:, j]).any():
                 draw_axis(results[k], ax, j, color=_COLORS[k % len(_COLORS)])
         ax.axhline(0, color=GREY, linewidth=0.6)
+        _draw_known(result, ax, j)
         _fit_height(ax, results, j)
-    if len(results) > 1:
+    if len(results) > 1 or result.known:
         lines, labels = panels[0].get_legend_handles_labels()
         panels[0].legend(lines[::-1], labels[::-1], loc="upper right", fontsize=8, frameon=False)
     panels[0].set_title(
@@ -89,6 +90,15 @@ def save_torque_figure(result: TorqueResult, path) -> None:
     panels[-1].set_xlabel(f"time from {result.epoch} [{time_scale(result.time_s)[1]}]")
     write_doubts(figure, result.doubts)
     save(figure, path)
+
+
+def _draw_known(result: TorqueResult, ax, j: int) -> None:
+    """The sum of what was taken off."""
+    if result.known:
+        t = result.time_s / time_scale(result.time_s)[0]
+        total = torque_scale(result)[0] * np.sum([k.torque_Nm[:, j] for k in result.known], axis=0)
+        names = ", ".join(k.name for k in result.known)
+        ax.plot(t, total, color=GREY, linewidth=1.0, linestyle="--", label=f"taken off: {names}")
 
 
 def _fit_height(ax, results: list[TorqueResult], j: int) -> None:

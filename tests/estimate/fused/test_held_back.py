@@ -27,8 +27,7 @@ def drawn(seed: int) -> list[Series]:
     x, values = start * rng.standard_normal(len(start)), []
     for k in range(len(SECONDS)):
         if k:
-            Q = m.Q[m.which[k]] + m.scale[k, 0] * m.driven[0, m.which[k]]
-            x = m.A[m.which[k]] @ x + rng.multivariate_normal(np.zeros(len(x)), Q, method="svd")
+            x = m.A[m.which[k]] @ x + rng.multivariate_normal(np.zeros(len(x)), m.Q[m.which[k]], method="svd")
         values.append(m.H @ x)
     v = np.array(values)
     return [Series(r, SECONDS, v[:, r] + np.sqrt(m.R[r]) * rng.standard_normal(len(v))) for r in (BODY_RATE, MOMENTUM)]

@@ -47,6 +47,30 @@ def test_recovery_nadir_hold_with_the_commanded_rate(tmp_path):
     _held(r)
 
 
+@pytest.mark.parametrize("without", [(), ("attitude_error",)], ids=["attitude error", "star tracker alone"])
+def test_recovery_nadir_hold_by_its_orbit(tmp_path, without):
+    """Held to LVLH axes: positions and velocities say what is commanded, and where attitude errors are missing these too."""
+    flown = leo.record(tmp_path, stop_s=500, orbit=True, without=without)
+    r = asflown.torque(flown, leo.craft(tmp_path, controller=leo.CONTROLLER))
+    assert r.settings["loop"] == "modelled" and r.settings["command"] == "LVLH of the orbit"
+    assert not r.doubts.has(COMMAND_SMOOTHED)
+    _held(r)
+
+
+def test_recovery_shadow_edge_in_a_long_record(tmp_path):
+    """Twenty-three minutes with a penumbra of 10 s: found, and covered within 15 s of it."""
+    r = asflown.torque(
+        leo.record(tmp_path, start_s=500, stop_s=1900), leo.craft(tmp_path, controller=leo.CONTROLLER), axis="x"
+    )
+    found = r.settings["torque"]["x"]
+    assert min(abs(t + 500 - 900) for t in found["edges_found_s"]) < 5
+    assert found["r_hat"] < 1.1 and found["effective_bulk"] > 100
+    near = np.abs(r.time_s - 900) <= 15
+    off = r.torque_Nm[:, 0] - leo.truth("nadir-eclipse", r.time_s)[:, 0]
+    assert np.mean(np.abs(off[near]) <= 1.96 * r.torque_sigma_Nm[near, 0]) >= 0.8
+    assert np.mean(np.abs(off) <= 1.96 * r.torque_sigma_Nm[:, 0]) > 0.9
+
+
 def test_recovery_nadir_hold_without_the_controller(tmp_path):
     r = asflown.torque(leo.record(tmp_path, stop_s=600), leo.craft(tmp_path, controller=""))
     assert r.settings["loop"] == "measured"

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...craft.model import PREDICTED_SHARE
 from ...dynamics.environment import gravity_gradient_regressor
 from ...dynamics.orbit import BODIES
 from ...dynamics.rigid_body import ELEMENTS, elements_of
@@ -44,6 +45,8 @@ _SCALE_HEIGHT_M = 60e3
 _AIR_MODELLED, _AIR_ASSUMED = (0.2, 0.1), (0.3, 0.3)
 #: One sigma of the torque on facets, as a share: their areas and optical constants are seldom known better.
 _FACETS = 0.1
+#: An inertia that was inferred or assumed, without a sigma, is known no better than a predicted one.
+_GUESSED = ("inferred", "assumed", "extrapolated")
 #: One sigma of a torque rod's dipole, as a share: hysteresis and rise time. Assumed.
 _RODS = 0.05
 
@@ -119,15 +122,13 @@ def environment_of(
     tai_ns = np.asarray(tai_ns, np.int64)
     place, doubts, why = _place(subject, tai_ns)
     tlm, craft = subject.telemetry, subject.craft.craft
-    field, no_field, of_field = (
-        field_at_craft(tlm, place) if {"dipole", "rods"} & set(which) else (None, "", [])
-    )
+    field, no_field = field_at_craft(tlm, place) if {"dipole", "rods"} & set(which) else (None, "")
     sun, no_sun, of_sun = sun_at_craft(tlm, place) if "sunlight" in which else (None, "", [])
     if "sunlight" in which:
         of_sun = [*of_sun, *sky_doubts(tlm, craft).of(*OF_THE_SUN)]
     makers = {
         "gravity-gradient": partial(_gravity, subject, place, why),
-        "sunlight": partial(_sunlight, craft, place, sun, no_sun),
+        "sunlight": partial(_sunlight, craft, sun, no_sun),
         "dipole": partial(_dipole, craft, field, no_field),
         "drag": partial(_drag, craft, place, air, why),
         "rods": partial(_rods, subject, tai_ns, field, no_field),
@@ -139,8 +140,8 @@ def environment_of(
         left_out={name: t for name, t in made.items() if isinstance(t, str)},
         R_NB=place.R_NB,
         lit=None if sun is None else sun.share,
-        phase_rad=_phase(place),
-        doubts=Doubts([*doubts, *of_field, *of_sun]),
+        phase_rad=None if place.velocity_N is None else place.phase,
+        doubts=Doubts([*doubts, *of_sun]),
     )
 
 
@@ -172,16 +173,6 @@ def _place(subject: Subject, tai_ns: np.ndarray) -> tuple[Place, Doubts, str]:
     return Place(tai_ns, tlm.dated, R, orbit, position, velocity, body), doubts, why
 
 
-def _phase(place: Place) -> np.ndarray | None:
-    """Angle swept since the first instant. (N,)"""
-    if place.position_N is None or place.velocity_N is None:
-        return None
-    r, v = place.position_N, place.velocity_N
-    rate = np.linalg.norm(np.cross(r, v), axis=1) / np.sum(r * r, axis=1)
-    t = (place.tai_ns - place.tai_ns[0]) / NS
-    return np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t))])
-
-
 # ---- the terms: a Term, or what is missing for it ----
 
 
@@ -206,10 +197,16 @@ def inertia_sigma(subject: Subject) -> np.ndarray:
     inertia is the sum of two of the first, a product one of the second."""
     moments = np.diag(subject.inertia_kgm2)  # type: ignore[arg-type]
     i, j = np.triu_indices(3)
-    return subject.inertia_share * np.sqrt(moments[i] * moments[j]) * np.where(i == j, 1.0, 0.5)
+    used = subject.craft.craft.mass_properties_used
+    guessed = any(m.basis in _GUESSED and m.sigma is None and m.piece != "given" for m in used)
+    return (
+        max(subject.inertia_share, PREDICTED_SHARE * guessed)
+        * np.sqrt(moments[i] * moments[j])
+        * np.where(i == j, 1.0, 0.5)
+    )
 
 
-def _sunlight(craft: Craft, place: Place, sun: Seen | None, missing: str) -> Term | str:
+def _sunlight(craft: Craft, sun: Seen | None, missing: str) -> Term | str:
     if sun is None:
         return missing
     design = sun.share[:, None, None] * levers(sun.u_B)
@@ -247,7 +244,8 @@ def _drag(craft: Craft, place: Place, air: Air | None, why: str) -> Term | str:
     if known is not None and density is not None:
         torque = drag_torque(craft, velocity, density)
         of_lever = _FACETS * torque[:, :, None] if known.sigma_Nm is None else design * known.sigma_Nm
-        swing = np.stack([np.ones(len(ratio)), np.cos(_phase(place)), np.sin(_phase(place))], axis=1)
+        phase = place.phase
+        swing = np.stack([np.ones(len(ratio)), np.cos(phase), np.sin(phase)], axis=1)
         sizes = np.array([shares[0], shares[1], shares[1]])
         errors = np.concatenate([of_lever, torque[:, :, None] * (swing * sizes)[:, None, :]], axis=2)
     return Term("drag", AXES, "N m", design, f"air stream from the orbit, density {source}", torque, errors)
@@ -259,9 +257,9 @@ def _density(place: Place, air: Air | None, reference: float | None):
     if air is not None and place.dated:
         from ...dynamics.thermosphere import density_at
 
-        rho = density_at(place.position_N, place.tai_s, air.f107, air.f107_mean, air.ap)
+        rho = density_at(place.position, place.tai_s, air.f107, air.f107_mean, air.ap)
         return rho / (reference or rho.mean()), rho, _AIR_MODELLED, "by NRLMSIS 2.1 (pymsis)"
-    height = np.linalg.norm(place.position_N, axis=1)
+    height = np.linalg.norm(place.position, axis=1)
     share = np.exp(-(height - height.mean()) / _SCALE_HEIGHT_M)
     share = share / share.mean()
     return share, None if reference is None else reference * share, _AIR_ASSUMED, "that falls by e over 60 km of height"

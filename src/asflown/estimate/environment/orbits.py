@@ -102,7 +102,7 @@ def orbit_in(
 def _about(orbit: Orbit, left_out: Callable[[Orbit], str]) -> tuple[Orbit | None, str, list[Doubt | None]]:
     """The orbit about the body that its acceleration tells, None where it cannot be believed, and doubts."""
     nearest_km = orbit.nearest_m / 1e3
-    found = orbit.acceleration()
+    found = _without_gaps(orbit).acceleration()
     earth = BODIES[0]
     if not found.told:
         if not earth.radius_m < orbit.nearest_m < 1e9:
@@ -137,6 +137,14 @@ def refuse_contradictions(telemetry: Telemetry, doubts: Doubts) -> None:
             str(d).removesuffix(": the gravity gradient is left out"), file=telemetry.source or None,
             channel="orbit_position", remedy=d.remedy,
         )  # fmt: skip
+
+
+def _without_gaps(orbit: Orbit) -> Orbit:
+    """The longest stretch without a gap: a curve through positions far apart has another acceleration."""
+    t = orbit.time_s
+    cuts = np.flatnonzero(np.diff(t) > 20 * float(np.median(np.diff(t)))) + 1
+    part = max(np.split(np.arange(len(t)), cuts), key=len)
+    return orbit if len(part) < FEWEST else Orbit(t[part], orbit.position_N[part], orbit.mu)
 
 
 def gravity_words(I_B: np.ndarray | None, span_s: float) -> Callable[[Orbit], str]:

@@ -1,6 +1,6 @@
 """What surrounds a craft at any instants: field, Sun and shadow, air stream, each from the best that is known, with where it is from.
 
-A channel is preferred to a model; where both are there, the model has judged the channel (``subject.sky``).
+A channel is preferred to a model; ``subject_of`` has judged it by then.
 """
 
 from __future__ import annotations
@@ -25,8 +25,10 @@ if TYPE_CHECKING:
 
 #: Fewest samples of a vector that are used.
 _FEWEST = 8
-#: A coarse sun sensor errs by a few degrees. [rad]
+#: Beyond it the measured Sun does not stand still. [rad]  A coarse sun sensor errs by a few degrees.
 _SUN_OFF = np.radians(15)
+#: Shadow by the sun sensor and by geometry may differ for so long at an edge. [s]
+_EDGE_S = 60.0
 #: Longest stretch over which the Sun stands still: it moves by 1 degree a day. [s]
 _SUN_STANDS_S = 6 * 3600.0
 
@@ -58,6 +60,21 @@ class Place:
     def at_earth(self) -> bool:
         return self.position_N is not None and self.body == BODIES[0].name
 
+    @property
+    def position(self) -> np.ndarray:
+        """``position_N`` where the craft is known to be at the Earth."""
+        assert self.position_N is not None
+        return self.position_N
+
+    @property
+    def phase(self) -> np.ndarray:
+        """Angle gone round the orbit since the first instant, where position and velocity are known. (N,) [rad]"""
+        assert self.velocity_N is not None
+        r = self.position
+        rate = np.linalg.norm(np.cross(r, self.velocity_N), axis=1) / np.sum(r * r, axis=1)
+        steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(self.tai_ns) / NS
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
     def to_body(self, v_N: np.ndarray) -> np.ndarray:
         assert self.R_NB is not None
         return np.einsum("nji,nj->ni", self.R_NB, v_N)
@@ -84,17 +101,16 @@ def attitude_at(telemetry: Telemetry, tai_ns: np.ndarray) -> np.ndarray | None:
     return Slerp(t, rotation(q))(np.clip((tai_ns - at[0]) / NS, t[0], t[-1])).as_matrix()
 
 
-def field_at_craft(telemetry: Telemetry, place: Place) -> tuple[Seen | None, str, list[Doubt]]:
-    """Magnetic field in body axes [T]; or None and why; doubts."""
+def field_at_craft(telemetry: Telemetry, place: Place) -> tuple[Seen | None, str]:
+    """Magnetic field in body axes [T]; or None and what is missing."""
     found = _channel(telemetry, "magnetic_field")
-    if found is None:
-        model = _igrf(place)
-        if isinstance(model, str):
-            return None, f"magnetic_field_x, _y, _z ({model})", []
-        return Seen(model, "field from IGRF-14 at the orbit's position (ppigrf)", np.ones(len(model))), "", []
-    t, B = found
-    u = _between(t, B, place.tai_ns)
-    return Seen(u, "field from the magnetometer", np.ones(len(u))), "", []
+    if found is not None:
+        u = _between(*found, place.tai_ns)
+        return Seen(u, "field from the magnetometer", np.ones(len(u))), ""
+    model = _igrf(place)
+    if isinstance(model, str):
+        return None, f"magnetic_field_x, _y, _z ({model})"
+    return Seen(model, "field from IGRF-14 at the orbit's position (ppigrf)", np.ones(len(model))), ""
 
 
 def _igrf(place: Place) -> np.ndarray | str:
@@ -104,7 +120,7 @@ def _igrf(place: Place) -> np.ndarray | str:
     from ...dynamics.magnetic_field import field_at
 
     try:
-        return place.to_body(field_at(place.position_N, place.tai_s))
+        return place.to_body(field_at(place.position, place.tai_s))
     except BadInput as why:
         return str(why.what)
 
@@ -118,7 +134,7 @@ def sun_at_craft(telemetry: Telemetry, place: Place) -> tuple[Seen | None, str, 
             return None, f"sun_direction_x, _y, _z ({model})", []
         from ...dynamics.sun import sunlit
 
-        lit = sunlit(place.position_N, model)
+        lit = sunlit(place.position, model)
         return Seen(place.to_body(model), "Sun from its ephemeris (ERFA), shadow from the orbit", lit), "", []
     t, s = found
     on = np.linalg.norm(s, axis=1) > 0.1
@@ -126,13 +142,13 @@ def sun_at_craft(telemetry: Telemetry, place: Place) -> tuple[Seen | None, str, 
     if on.sum() < _FEWEST:
         return Seen(np.zeros((len(lit), 3)), "Sun from the sun sensor: shadow throughout", np.zeros(len(lit))), "", []
     t_on, s_on = t[on], s[on] / np.linalg.norm(s[on], axis=1, keepdims=True)
-    doubts: list[Doubt] = []
+    whole = "Sun and shadow from the sun sensor"
     if place.R_NB is None:
-        u = _unit(_between(t_on, s_on, place.tai_ns))
-    else:
-        sun_N, doubts = _steady_sun(telemetry, t_on, s_on, place)
-        u = place.to_body(sun_N)
-    return Seen(u, "Sun and shadow from the sun sensor", lit), "", doubts
+        return Seen(_unit(_between(t_on, s_on, place.tai_ns)), whole, lit), "", []
+    sun_N, doubts = _steady_sun(telemetry, t_on, s_on, place)
+    if place.at_earth:
+        lit, whole = _shadow(sun_N, lit, whole, place)
+    return Seen(place.to_body(sun_N), whole, lit), "", doubts
 
 
 def _modelled_sun(place: Place) -> np.ndarray | str:
@@ -157,6 +173,22 @@ def _steady_sun(telemetry: Telemetry, t: np.ndarray, s_B: np.ndarray, place: Pla
     )
     doubts: list[Doubt] = [SUN_TURNS(off_deg=float(np.degrees(off)))] if off > _SUN_OFF else []
     return _unit(_between(middles, means, place.tai_ns)), doubts
+
+
+def _shadow(sun_N: np.ndarray, lit: np.ndarray, whole: str, place: Place) -> tuple[np.ndarray, str]:
+    """The orbit's shadow with its penumbra where the sensor's agrees with it at the edges, else the sensor's.
+
+    The Sun is where the sensor has it: the date need not be known."""
+    from ...dynamics.sun import sunlit
+
+    geometric = sunlit(place.position, sun_N)
+    step = np.gradient(_s(place.tai_ns, place.tai_ns[0])) if len(lit) > 1 else np.ones(1)
+    by_orbit, by_sensor = geometric > 0.5, lit > 0.5
+    dark, light = (float(np.sum(step[m])) for m in (by_orbit & ~by_sensor, ~by_orbit & by_sensor))
+    edges = max(int(np.sum(np.diff(by_sensor))), int(np.sum(np.diff(by_orbit))), 1)
+    if max(dark, light) <= _EDGE_S * edges:
+        return geometric, "Sun from the sun sensor, shadow from the orbit"
+    return lit, whole
 
 
 def _channel(telemetry: Telemetry, stem: str) -> tuple[np.ndarray, np.ndarray] | None:

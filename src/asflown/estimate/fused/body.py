@@ -46,19 +46,23 @@ class Body:
     inertia_kgm2: float
     wiener: bool = False
 
-    STATES: ClassVar[int]
     RATE: ClassVar[int]  # index of the body rate, and of the actuators' momentum
     STORED: ClassVar[int]
     SPREAD: ClassVar[tuple[float, ...]]  # of the weak log-normal priors, in the order of the Levels
     NARROWS: ClassVar[bool] = True  # whether the data may say how far off what is taken as known is
 
     @property
+    def states(self) -> int:
+        """How many."""
+        raise NotImplementedError
+
+    @property
     def torque(self) -> int:
-        return self.STATES - 2
+        return self.states - 2
 
     @property
     def slope(self) -> int:
-        return self.STATES - 1
+        return self.states - 1
 
     def dynamics(self, v) -> tuple[np.ndarray, np.ndarray]:
         """F and spectral density of all but the torque's own two rows."""
@@ -109,7 +113,7 @@ class Body:
         deviation = np.array([*self.start(v, times), first, k * first])
         H, white = self.measured(v)
         H, R = H[times.base], (white**2 + times.quantum**2 / 12)[times.base] + (self.timing_s(v) * times.steep) ** 2
-        return Model(A, fixed, driven, scale, times.which, H, R, np.zeros(self.STATES), np.diag(deviation**2))
+        return Model(A, fixed, driven, scale, times.which, H, R, np.zeros(self.states), np.diag(deviation**2))
 
     def smooth_model(self, v, times: Times) -> Model:
         """With the torque of the fitted levels."""

@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 from scipy.integrate import cumulative_trapezoid
-from scipy.interpolate import BSpline, make_lsq_spline, make_smoothing_spline
+from scipy.interpolate import BSpline, CubicHermiteSpline, make_lsq_spline, make_smoothing_spline
 from scipy.spatial.transform import Rotation, Slerp
 
 from ...dynamics.loop import filtered_rate
 from ...kit.doubts import Doubts, Kind, Severity
-from ...kit.rotations import attitude_error, rates_between, rotation, turned_by
+from ...kit.rotations import attitude_error, lvlh_to_inertial, rates_between, rotation, turned_by
+from ...kit.timeline import NS
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
 from .series import ATTITUDE_ERROR, BODY_RATE, MOMENTUM, Series
@@ -36,6 +37,9 @@ _SMOOTHED_S, _LOOP_TIMES = 300.0, 50.0
 _PLAIN = 3.0
 #: Shortest block whose mean is smoothed. [s]
 _BLOCK_S = 10.0
+#: A craft is held to its orbit where its attitude stays this near one in LVLH axes [rad], with positions over this share of the
+#: attitudes and no fewer than so many.
+_STILL_RAD, _COVERED, _FEWEST = 0.02, 0.95, 8
 
 FED_OTHERWISE = Kind(
     "fused.fed-otherwise", Severity.SUSPECT,
@@ -85,23 +89,78 @@ class Command:
 
 
 def has_command(subject: Subject) -> bool:
-    """Whether the telemetry tells what is commanded."""
+    """Whether the telemetry tells what is commanded: by channels, or by an orbit whose LVLH axes the craft follows."""
     tlm = subject.telemetry
-    return tlm.has_axes("commanded_rate") or all(n in tlm for n in _COMMANDED)
+    told = tlm.has_axes("commanded_rate") or all(n in tlm for n in _COMMANDED)
+    return told or held_to_orbit(subject) is not None
 
 
 def has_attitudes(subject: Subject) -> bool:
     """Whether the telemetry tells the attitude and the commanded one."""
-    return all(n in subject.telemetry for n in (*_QUATERNION, *_COMMANDED))
+    if not all(n in subject.telemetry for n in _QUATERNION):
+        return False
+    return all(n in subject.telemetry for n in _COMMANDED) or held_to_orbit(subject) is not None
 
 
 def errors_from_quaternions(subject: Subject, grid: Grid) -> dict[int, Series]:
     """The error of the telemetered attitude against the commanded one."""
-    tai_ns, q = together(subject.telemetry, [*_QUATERNION, *_COMMANDED])
+    tlm = subject.telemetry
+    if all(n in tlm for n in _COMMANDED):
+        tai_ns, q = together(tlm, [*_QUATERNION, *_COMMANDED])
+        error = attitude_error(q[:, 4:], q[:, :4])
+    else:
+        held = held_to_orbit(subject)
+        tai_ns, q = together(tlm, _QUATERNION)
+        inside = (tai_ns >= held.tai_ns[0]) & (tai_ns <= held.tai_ns[-1])
+        tai_ns, q = tai_ns[inside], q[inside]
+        error = (rotation(q).inv() * held.at(tai_ns)).as_rotvec()
     s = grid.of(tai_ns)
     inside = (s >= 0) & (s <= grid.seconds[-1] + 1e-6)
-    error = attitude_error(q[inside, 4:], q[inside, :4])
-    return {j: Series(ATTITUDE_ERROR, s[inside], error[:, j]) for j in range(3)}
+    return {j: Series(ATTITUDE_ERROR, s[inside], error[inside, j]) for j in range(3)}
+
+
+@dataclass(frozen=True)
+class HeldToOrbit:
+    """An attitude that stands still in LVLH axes: its turn off them, body to LVLH, and the orbit (N, 3) at some instants (N,)."""
+
+    tai_ns: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    turn: Rotation
+
+    def _orbit(self, tai_ns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        t = (self.tai_ns - self.tai_ns[0]) / NS
+        path = CubicHermiteSpline(t, self.position, self.velocity)
+        at = np.clip((tai_ns - self.tai_ns[0]) / NS, 0.0, t[-1])
+        return path(at), np.column_stack([np.interp(at, t, v) for v in self.velocity.T])
+
+    def at(self, tai_ns: np.ndarray) -> Rotation:
+        """The attitude held, body to inertial."""
+        return lvlh_to_inertial(*self._orbit(tai_ns)) * self.turn
+
+    def rate(self, tai_ns: np.ndarray) -> np.ndarray:
+        """Of the attitude held, body axes (N, 3) [rad/s]: along a Kepler orbit, (0, -|r x v| / r^2, 0) in LVLH axes."""
+        r, v = self._orbit(tai_ns)
+        size = np.linalg.norm(np.cross(r, v), axis=1) / np.sum(r**2, axis=1)
+        return self.turn.inv().apply(np.outer(size, [0.0, -1.0, 0.0]))
+
+
+def held_to_orbit(subject: Subject) -> HeldToOrbit | None:
+    """The attitude held in LVLH axes, where positions, velocities and attitudes say that there is one."""
+    tlm = subject.telemetry
+    names = [f"orbit_{v}_{a}" for v in ("position", "velocity") for a in AXES]
+    if not all(n in tlm for n in (*names, *_QUATERNION)):
+        return None
+    tai_ns, orbit = together(tlm, names)
+    at, q = together(tlm, _QUATERNION)
+    inside = (at >= tai_ns[0]) & (at <= tai_ns[-1]) if len(tai_ns) else np.zeros(len(at), bool)
+    if len(tai_ns) < _FEWEST or np.mean(inside) < _COVERED or not np.all(np.linalg.norm(orbit[:, :3], axis=1) > 0):
+        return None
+    held = HeldToOrbit(tai_ns, orbit[:, :3], orbit[:, 3:], Rotation.identity())
+    off = held.at(at[inside]).inv() * rotation(q[inside])
+    mean = off.mean()
+    still = np.quantile((mean.inv() * off).magnitude(), 0.95) < _STILL_RAD
+    return replace(held, turn=mean) if still else None
 
 
 def command_of(
@@ -109,7 +168,8 @@ def command_of(
 ) -> Command:
     """What the craft is commanded to do; ``stored``: instants (N,) and the actuators' momentum there (N, 3).
 
-    From the channel, the commanded attitude, or the smoothed body rates, which is right in a hold alone."""
+    From the channel, the commanded attitude, the orbit whose LVLH axes the craft follows, or the smoothed attitude or body rates, which is
+    right in a hold alone."""
     law, I_B = subject.controller(), subject.known_inertia()
     rate, acceleration, variance, source = _commanded(subject, grid, series, law)
     at = grid.seconds
@@ -160,6 +220,12 @@ def _commanded(subject: Subject, grid: Grid, series, law: WheelController):
         rate = np.column_stack([f(inside) for f in smooth])
         return rate, np.column_stack([f.derivative()(inside) for f in smooth]), np.zeros((2, 3)), "commanded attitude"
     most, block_s = _smoothing(law, at)
+    held = held_to_orbit(subject)
+    if held is not None:
+        told = held.rate(grid.start_ns + np.round(at * NS).astype(np.int64))
+        slow = [_smoothed(at, told[:, j], 0, most, block_s) for j in range(3)]
+        rate, push = (np.column_stack([f.at(at, k) for f in slow]) for k in (0, 1))
+        return rate, push, np.array([f.variance for f in slow]).T, "LVLH of the orbit"
     measured = [next(s for s in series[j] if s.row == BODY_RATE) for j in range(3)]
     fits = [_smoothed(s.seconds, ndimage.median_filter(s.values, 5), 0, most, block_s) for s in measured]
     found = [np.column_stack([f.at(at, k) for f in fits]) for k in (0, 1)]

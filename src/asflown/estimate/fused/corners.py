@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
+from ...kit.convergence import Convergence, worst
 from ...kit.ensemble import Gains, gains, paths, simulate, spread, whiten
 from .body import AxisData, Posterior
 from .corner_sampler import sample
@@ -45,15 +46,25 @@ BEND_FREEDOM = 1.0
 _CORNER_PRIOR = (1.0, 60.0)
 #: Most instants that are all candidates; in a longer record those near suspect instants are, and so many others.
 _CANDIDATES, _COARSE = 1200, 60
+#: A torque whose fitted length is above this is slow, with edges in it; a faster one is made of excursions, which lines suit. [s]
+_SLOW_S = 60.0
 #: Lengths of the ramps in a long record [s]: a bend for each end, of a size of its own, would have them long, whatever the data
 #: say (by the cube of the length).  Edges are steps, or a shadow's penumbra of seconds.
 _RAMPS_S = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 #: Beta prior of the share of instants of a long record that are edges: one in ten minutes, to a factor of e. [s]
 _EDGE_PRIOR = (1.0, 600.0)
+#: Usual size of an edge, as a share of the slow torque's; the sizes are Cauchy, so that large ones are as welcome.
+_EDGE_SHARE = 0.1
 #: Proposals for each candidate instant, the fewest in all, and the share thrown away.
 _PROPOSALS, _LEAST_PROPOSALS, _BURN_IN = 50, 30_000, 0.4
 #: Chains whose draws are put together: one alone may stay with few corners and much roughness, or many and little.
 _CHAINS = 4
+#: In a long record chains that lie further apart than this walk again, with so many times the proposals.
+_FAR, _FURTHER = 1.05, 6
+#: Chains have met below this R-hat; the furthest that widens a band.
+_MET, _FURTHEST = 1.01, 5.0
+#: Draws of a chain for each that is used, to see whether chains have met; at how many instants that is looked at.
+_MORE, _LOOKED_AT = 5, 16
 #: Innovations whose mean square is above 1 by this many standard errors are not explained. [sigma]
 _UNEXPLAINED = 5.0
 #: Where pure lines are more probable than this, the peaks' sigma needs no scale (flights give 0.8 to 1.1,
@@ -88,6 +99,30 @@ class _Walked:
 
 
 @dataclass(frozen=True)
+class _Found:
+    """What all chains drew, innovations (M,) of the most frequent way, whether these are as small as they should be, and whether
+    the chains have met."""
+
+    drawn: _Walked
+    left: np.ndarray
+    explained: bool
+    met: Convergence
+
+    def widened(self, post: Posterior) -> Posterior:
+        """Of chains that lie apart the mean is itself uncertain, by what lies between them over their number less one."""
+        if self.met.r_hat <= _MET:
+            return post
+        wider = math.sqrt(1 + (min(self.met.r_hat, _FURTHEST) ** 2 - 1) / (_CHAINS - 1))
+        return replace(post, paths=post.mean + wider * (post.paths - post.mean))
+
+    @property
+    def settings(self) -> dict:
+        return {
+            "explained": self.explained, "r_hat": self.met.r_hat, "effective_bulk": self.met.bulk, "effective_tail": self.met.tail,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
 class _Search:
     """What does not depend on the values measured: candidate corners, their responses, and priors.
 
@@ -118,7 +153,7 @@ class _Search:
         ramps = np.clip((t[:, None] - at_s) / long_s + 0.5, 0.0, 1.0)
         begin = np.searchsorted(t, at_s - long_s / 2)
         begin = np.minimum.accumulate(begin[::-1])[::-1]  # must not fall: a few steps of zeros more
-        return cls._of(axis, ramps, begin, axis.levels.torque_Nm**2, each_s, _EDGE_PRIOR, rng)
+        return cls._of(axis, ramps, begin, (_EDGE_SHARE * axis.levels.torque_Nm) ** 2, each_s, _EDGE_PRIOR, rng)
 
     @classmethod
     def _of(cls, axis: AxisData, shapes, begin, variance: float, each_s: np.ndarray, prior, rng: Generator) -> _Search:
@@ -154,7 +189,15 @@ class _Search:
 
     def lines(self, coefficients: np.ndarray) -> np.ndarray:
         """Torques (K, N) of coefficients (K, C), without roughness."""
-        return np.delete(coefficients, np.s_[2 : self.fixed], axis=1) @ self.basis.T
+        chosen = np.delete(coefficients, np.s_[2 : self.fixed], axis=1)
+        used = np.any(chosen, axis=0)  # most are in no set that was drawn
+        return chosen[:, used] @ self.basis[:, used].T
+
+    def quantities(self, chains: list[_Walked]) -> list[np.ndarray]:
+        """What is looked at to see whether chains have met, each (chains, draws): corners, and the torque at some instants."""
+        few = replace(self, basis=self.basis[np.linspace(0, len(self.basis) - 1, _LOOKED_AT).astype(int)])
+        torques = np.array([few.lines(c.bends) for c in chains])
+        return [np.array([c.corners for c in chains]), *np.moveaxis(torques, 2, 0)]
 
     def walk(
         self,
@@ -178,7 +221,8 @@ class _Search:
     def torques(self, ways: list[_Way], value: np.ndarray, drawn: _Walked) -> np.ndarray:
         """Torques (K, N) of draws given the measurements (M,), their roughness drawn too."""
         body, torque = self.axis.body, self.lines(drawn.bends)
-        residual = value[:, None] - self.seen @ drawn.bends.T
+        used = np.any(drawn.bends, axis=0)
+        residual = value[:, None] - self.seen[:, used] @ drawn.bends[:, used].T
         for k, way in enumerate(ways):
             mine = drawn.which == k
             if way.rough and mine.any():
@@ -190,47 +234,50 @@ class _Search:
 def draw_torques(axis: AxisData, count: int, rng: Generator) -> Posterior:
     """The posterior of corners, bends and roughness at the axis's levels.
 
-    In a long record corners are looked for near suspect instants, beside a smooth torque of the levels between the edges
-    (``suspects``).  Where the first draws do not explain the data as well as a smooth torque does, the sampler is given ten times
+    In a long record, and where the torque is slow, ramps are looked for near suspect instants, beside a smooth torque of the levels
+    between the edges (``suspects``).  Where the first draws do not explain the data as well as a smooth torque does, the sampler is given ten times
     as many proposals; ``Posterior.explained`` says whether they did in the end."""
     wanted = axis.times.seconds[axis.times.wanted]
-    if not all_candidates(len(wanted)):
+    if not all_candidates(len(wanted)) or axis.levels.length_s > _SLOW_S:
         return _in_long(axis, wanted, count, rng)
     search = _Search.of_bends(axis, wanted, rng)
     ways, found = _ways(search, count)
-    drawn, left, explained = _walked(search, ways, _PRIOR, found, count)
+    walked = _walked(search, ways, _PRIOR, found, count)
+    drawn = walked.drawn
     torque = search.torques(ways, axis.data.value, drawn)
     mean, as_lines, scale = torque.mean(axis=0), float(np.mean(drawn.which == 0)), 1.0
     settings = {
         "corners": float(drawn.corners.mean()),
         "lines_probability": as_lines,
         "smooth_probability": float(np.mean(drawn.which == len(ways) - 1)),
-        "explained": explained,
+        **walked.settings,
     }
-    if explained and as_lines < _SURE_OF_LINES:
+    if walked.explained and as_lines < _SURE_OF_LINES:
         shown = axis.times.wanted
         peaks = excursions(mean[shown], spread(torque[:, shown]))
         if len(peaks):
             true, flown = _flown_again(search, ways, drawn, torque)
             scale = settings["peak_scale"] = peak_scale(axis.times.seconds[shown], mean[shown], peaks, true, flown)
     considered = drawn.bends[:, 2 : search.fixed]
-    return Posterior(mean, torque, considered, left, settings, explained, scale)
+    return walked.widened(Posterior(mean, torque, considered, walked.left, settings, walked.explained, scale))
 
 
 def _in_long(axis: AxisData, wanted: np.ndarray, count: int, rng: Generator) -> Posterior:
-    """As ``draw_torques``, of a record with more instants than candidates can be."""
+    """As ``draw_torques``, of a slow torque, or of a record with more instants than candidates can be."""
     found = suspects(axis)
     at, length, each = _ramps(found, wanted)
     search = _Search.of_ramps(replace(axis, levels=found.levels), at, length, each, rng)
     ways = [search.way(found.levels.torque_Nm, found.levels.length_s)]
     start = [search.fixed + int(np.argmin(np.abs(at - t) + np.abs(np.log(length / 8.0)))) for t in found.edges]
-    drawn, left, explained = _walked(search, ways, np.ones(1), np.unique(np.array(start, np.int64)), count)
+    walked = _walked(search, ways, np.ones(1), np.unique(np.array(start, np.int64)), count, (1, _FURTHER), _FAR)
+    drawn = walked.drawn
     torque = search.torques(ways, axis.data.value, drawn)
     settings = {
         "edges": float(drawn.corners.mean()), "edges_found_s": found.edges.tolist(), "suspects": len(found.seconds),
-        "torque_between_edges_Nm": found.levels.torque_Nm, "length_between_edges_s": found.levels.length_s, "explained": explained,
+        "torque_between_edges_Nm": found.levels.torque_Nm, "length_between_edges_s": found.levels.length_s, **walked.settings,
     }  # fmt: skip
-    return Posterior(torque.mean(axis=0), torque, drawn.bends[:, 2 : search.fixed], left, settings, explained)
+    considered = drawn.bends[:, 2 : search.fixed]
+    return walked.widened(Posterior(torque.mean(axis=0), torque, considered, walked.left, settings, walked.explained))
 
 
 def _ramps(found: Suspects, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -271,20 +318,24 @@ def _ways(search: _Search, count: int) -> tuple[list[_Way], np.ndarray]:
     return ways, search.fixed + np.flatnonzero(first[-1, search.fixed :])
 
 
-def _walked(search: _Search, ways: list[_Way], prior, found: np.ndarray, count: int) -> tuple[_Walked, np.ndarray, bool]:
-    """Draws of all chains, innovations (M,) of the most frequent way, and whether these are as small as they should be."""
+def _walked(
+    search: _Search, ways: list[_Way], prior, found: np.ndarray, count: int, efforts=(1, 10), apart: float = np.inf
+) -> _Found:
+    """Draws of all chains, with more proposals (``efforts``) where the first do not explain the data, or the chains lie apart."""
     own, evidence = [w.gains.own for w in ways], [w.gains.log_likelihood for w in ways]
-    for effort in (1, 10):
-        chains = [search.walk(ways, prior, own, evidence, found, -(-count // _CHAINS), effort) for _ in range(_CHAINS)]
+    of_each = -(-count // _CHAINS)
+    for effort in efforts:
+        chains = [search.walk(ways, prior, own, evidence, found, _MORE * of_each, effort) for _ in range(_CHAINS)]
+        met = worst(search.quantities(chains))
         drawn = _Walked(
-            *(np.concatenate(x)[:count] for x in zip(*((c.bends, c.corners, c.which) for c in chains), strict=True))
-        )
+            *(np.concatenate(x)[:count] for x in zip(*((c.bends[::_MORE], c.corners[::_MORE], c.which[::_MORE]) for c in chains), strict=True))
+        )  # fmt: skip
         usual = int(np.bincount(drawn.which).argmax())
         left = own[usual] - ways[usual].columns @ drawn.bends[drawn.which == usual].mean(axis=0)
         explained = bool(np.mean(left**2) < max(1, np.mean(own[-1] ** 2)) + _UNEXPLAINED * math.sqrt(2 / len(left)))
-        if explained:
+        if explained and met.r_hat < apart:
             break
-    return drawn, left, explained
+    return _Found(drawn, left, explained, met)
 
 
 def _flown_again(search: _Search, ways: list[_Way], drawn: _Walked, torque) -> tuple[np.ndarray, np.ndarray]:

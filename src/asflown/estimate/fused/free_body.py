@@ -50,7 +50,6 @@ class FreeLevels(Levels):
 class FreeBody(Body):
     """A body whose actuators are only read."""
 
-    STATES: ClassVar[int] = _STATES
     RATE: ClassVar[int] = _RATE
     STORED: ClassVar[int] = _STORED
     # lengths of a torque: from a thruster's seconds to an orbit
@@ -58,6 +57,10 @@ class FreeBody(Body):
     # A channel's scale is not in the channel: regressed on its own smoothed self it would shrink towards nothing,
     # the more so the longer the record.
     NARROWS: ClassVar[bool] = False
+
+    @property
+    def states(self) -> int:
+        return _STATES
 
     def control(self, v: FreeLevels) -> np.ndarray:
         """The actuators' torque on the body per unit inertia, (n,), of the states."""

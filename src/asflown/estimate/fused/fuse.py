@@ -34,7 +34,7 @@ from .free_body import FreeBody
 from .gather import CannotFuse, Record, gather, needed
 from .held_body import HeldBody
 from .innovations import Innovations, by_channel, considered_doubts, innovation_doubts
-from .levels import AxisFit, fit_doubts, fit_levels
+from .levels import AxisFit, fit_doubts, fit_levels, unfitted
 from .series import MOMENTUM
 from .smooth_torque import gaussian_torque, widened
 from .turning import COMMAND_SMOOTHED, CommandNotKnown, check_turn
@@ -71,6 +71,17 @@ CORNERS_DO_NOT_EXPLAIN = Kind(
     "fused.corners-do-not-explain", Severity.CAUTION,
     "straight lines between corners do not explain the torque about {axis}: a smooth torque is taken instead",
 )  # fmt: skip
+
+
+CHAINS_APART = Kind(
+    "fused.chains-apart", Severity.SUSPECT,
+    "the chains that look for corners about {axis} do not agree (R-hat {r_hat:.2f}, {draws:.0f} effective draws): other corners "
+    "explain the data as well, and the band is widened by that",
+    "Use --prior matern to see a smooth torque, or narrow the window with --start and --stop.",
+)  # fmt: skip
+#: Chains do not agree above this R-hat, or with fewer effective draws.  With the few hundred of a usual event the largest R-hat of many
+#: instants is above 1.01 by chance; below this its share of the band is a few percent.
+_APART, _FEW = 1.1, 40
 
 
 @dataclass(frozen=True)
@@ -222,10 +233,13 @@ def _fused(
     I_B, grid = subject.known_inertia(), record.grid
     prior = prior or "edges"
     bodies = {j: _body(subject, record, j, wiener=prior == "wiener") for j in record.series}
+    whole, still = len(bodies) == 3, record.loop == "modelled" and record.command is None
+    if still:  # a turn that counts is seen before the levels are fitted, and need not be fitted twice
+        _check_turn(record, _motion(bodies, {j: unfitted(bodies[j], record.series[j]) for j in bodies}, record), I_B)
     fits = {j: fit_levels(bodies[j], record.series[j]) for j in bodies}
-    motion, whole = _motion(bodies, fits, record), len(bodies) == 3
-    if record.loop == "modelled" and record.command is None:
-        check_turn(record.series, motion.rate, I_B, motion.stored_Nms, motion.torque_sigma_Nm)
+    motion = _motion(bodies, fits, record)
+    if still:
+        _check_turn(record, motion, I_B)
     coupling = _Coupling.of(motion, I_B, considered["inertia"], record.command, whole=whole)
     if whole and not record.together:
         fits = _carried(subject, axes, record, motion, fits)
@@ -251,6 +265,10 @@ def _fused(
         {AXES[j]: replace(s.data, start_s=start_s) for j, s in solved.items()},
         record.loop, unexplained, settings, record.doubts + found,
     )  # fmt: skip
+
+
+def _check_turn(record: Record, motion: _Motion, I_B: np.ndarray) -> None:
+    check_turn(record.series, motion.rate, I_B, motion.stored_Nms, motion.torque_sigma_Nm)
 
 
 def _followed(command: Command | None) -> dict:
@@ -329,7 +347,7 @@ def _solve(
 ) -> _Solved:  # fmt: skip
     """The torque of axis ``j`` at the wanted instants, the coupling to other axes taken off first."""
     name, axis = AXES[j], whole.without_known(coupling.known(grid, j))
-    sizes, columns = _sensitivities(whole, considered)
+    sizes, columns = _sensitivities(whole, axis, considered)
     columns = np.column_stack([columns, coupling.considered(grid, j, whole)])
     learnt = replace(axis, columns=columns if axis.body.NARROWS else columns[:, :0])
     doubts: list[Doubt] = []
@@ -348,18 +366,30 @@ def _solve(
         n: (s * float(c.mean()), s * float(c.std())) for (n, s), c in zip(sizes.items(), post.considered.T, strict=False)
     }
     unexplained = innovation_doubts(name, innovations)
-    doubts += unexplained + considered_doubts(name, sizes, post.considered)
+    doubts += unexplained + considered_doubts(name, sizes, post.considered) + _apart(name, post.settings)
     wanted = axis.times.wanted
     return _Solved(
         post.mean[wanted], post.paths[:, wanted], post.peak_scale, off, innovations, unexplained, post.settings, doubts, learnt
     )  # fmt: skip
 
 
-def _sensitivities(axis: AxisData, considered: dict[str, float]) -> tuple[dict[str, float], np.ndarray]:
-    """Sigmas by name, and sensitivities (M, P) of one sigma each, of what is taken as known and moves these measurements."""
-    found = axis.body.sensitivities(axis, smooth(axis.model, axis.data))
+def _apart(name: str, found: dict) -> list[Doubt]:
+    """Whether chains, if there were any, lie apart."""
+    draws = min(found.get("effective_bulk", np.inf), found.get("effective_tail", np.inf))
+    if found.get("r_hat", 1.0) <= _APART and draws >= _FEW:
+        return []
+    return [CHAINS_APART(axis=name, r_hat=found["r_hat"], draws=draws)]
+
+
+def _sensitivities(whole: AxisData, axis: AxisData, considered: dict[str, float]) -> tuple[dict[str, float], np.ndarray]:
+    """Sigmas by name, and sensitivities (M, P) of one sigma each, of what is taken as known and moves these measurements.
+
+    ``axis``: less the coupling, ``whole``: with it.  The wheels' scale is in w x H as in their momentum: it counts by the torque alone."""
+    found = whole.body.sensitivities(whole, smooth(whole.model, whole.data))
+    if axis is not whole and considered["spin_inertia"] > 0:
+        found["spin_inertia"] = axis.body.sensitivities(axis, smooth(axis.model, axis.data))["spin_inertia"]
     names = [n for n, column in found.items() if considered[n] > 0 and np.any(column)]
-    columns = np.column_stack([considered[n] * found[n] for n in names] or [axis.columns])
+    columns = np.column_stack([considered[n] * found[n] for n in names] or [whole.columns])
     return {n: considered[n] for n in names}, columns
 
 

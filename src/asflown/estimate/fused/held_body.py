@@ -1,7 +1,7 @@
 """The closed loop with an unknown torque in it: the controller and its rate filter are known.
 
-One axis has ten states: attitude and rate of the body; the rate filter's four; the wheels' momentum; the
-slow error of the attitude estimate, which the controller flies on; the torque and its slope.
+One axis has ten states: attitude and rate of the body; the wheels' momentum; the slow error of the attitude
+estimate, which the controller flies on; the rate filter's four, where there is one; the torque and its slope.
 
     attitude'  = rate
     I rate'    = T + u + w_u                     u = J KD (KP e - F(rate)),   e = -(attitude + error)
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ...kit.smoother import Smoothed
     from .body import AxisData
 
-_ATTITUDE, _RATE, _FILTER, _STORED, _ERROR, _TORQUE, _STATES = 0, 1, 2, 6, 7, 8, 10
+_ATTITUDE, _RATE, _STORED, _ERROR, _FILTER = 0, 1, 2, 3, 4
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,6 @@ class HeldBody(Body):
     delay_s: float = 0.0
     believes: bool = False
 
-    STATES: ClassVar[int] = _STATES
     RATE: ClassVar[int] = _RATE
     STORED: ClassVar[int] = _STORED
     # lengths of a torque: from a thruster's seconds to an orbit
@@ -80,34 +79,46 @@ class HeldBody(Body):
             believes=believed_kgm2 is not None,
         )  # fmt: skip
 
+    @property
+    def late_s(self) -> float:
+        """Delay of the rate that the controller sees: of the filter's cascade it is 4 z / w."""
+        return 4 * self.filter_damping / self.filter_rad_s + self.delay_s
+
+    @property
+    def states(self) -> int:
+        return 10 if self.late_s else 6
+
     def dynamics(self, v: LoopLevels) -> tuple[np.ndarray, np.ndarray]:
-        z = self.filter_damping
-        late_s = 4 * z / self.filter_rad_s + self.delay_s  # the cascade's delay is 4 z / w
-        w = 4 * z / late_s if late_s else 1.0
-        stiffness = -self.kd_per_s * self.kp_per_s
-        F, Q = np.zeros((2, _STATES, _STATES))
+        n, stiffness = self.states, -self.kd_per_s * self.kp_per_s
+        F, Q = np.zeros((2, n, n))
         F[_ATTITUDE, _RATE] = 1
-        F[_RATE, [_ATTITUDE, _ERROR, _FILTER + 2, _TORQUE]] = stiffness, stiffness, -self.kd_per_s, 1
-        F[_RATE, _RATE] = -stiffness * self.delay_s
-        if not late_s:  # the rate itself; what passes the filter goes nowhere
-            F[_RATE, [_FILTER + 2, _RATE]] = 0, -self.kd_per_s
+        F[_RATE, [_ATTITUDE, _ERROR, self.torque]] = stiffness, stiffness, 1
+        if self.late_s:
+            self._filter_into(F)
+        F[_RATE, _FILTER + 2 if self.late_s else _RATE] = -self.kd_per_s
+        F[_RATE, _RATE] -= stiffness * self.delay_s
         F[_STORED] = -F[_RATE]
-        F[_STORED, _TORQUE] = 0
-        for stage, source in ((_FILTER, _RATE), (_FILTER + 2, _FILTER)):
-            F[stage, stage + 1] = 1
-            F[stage + 1, [source, stage, stage + 1]] = w**2, -(w**2), -2 * z * w
+        F[_STORED, self.torque] = 0
         F[_ERROR, _ERROR] = -1 / v.error_time_s
         Q[_ERROR, _ERROR] = 2 * v.error_slow_rad**2 / v.error_time_s
-        spread = np.zeros(_STATES)  # where w_u goes
+        spread = np.zeros(n)  # where w_u goes
         spread[_RATE], spread[_STORED] = 1, -1
         Q += (v.reaction_Nm_sqrt_s / self.inertia_kgm2) ** 2 * np.outer(spread, spread)
         return F, Q
+
+    def _filter_into(self, F: np.ndarray) -> None:
+        """The cascade of two filters on the rate."""
+        z = self.filter_damping
+        w = 4 * z / self.late_s
+        for stage, source in ((_FILTER, _RATE), (_FILTER + 2, _FILTER)):
+            F[stage, stage + 1] = 1
+            F[stage + 1, [source, stage, stage + 1]] = w**2, -(w**2), -2 * z * w
 
     def sensitivities(self, axis: AxisData, best: Smoothed) -> dict[str, np.ndarray]:
         """The response to the torque under other numbers.
 
         Per unit of the body's inertia the loop has the craft's own gains, but where the controller's inertia is stated."""
-        torque = self.inertia_kgm2 * best.mean[:, _TORQUE]
+        torque = self.inertia_kgm2 * best.mean[:, self.torque]
         here = axis.response(torque)
         stored = axis.channel == MOMENTUM
         changes = {
@@ -122,7 +133,7 @@ class HeldBody(Body):
         return found | {"inertia": inertia, "spin_inertia": np.where(stored, here, 0.0)}
 
     def measured(self, v: LoopLevels) -> tuple[np.ndarray, np.ndarray]:
-        H = np.zeros((len(ROWS), _STATES))
+        H = np.zeros((len(ROWS), self.states))
         H[ATTITUDE_ERROR, [_ATTITUDE, _ERROR]] = -1
         H[BODY_RATE, _RATE] = 1
         H[MOMENTUM, _STORED] = self.inertia_kgm2
@@ -131,7 +142,8 @@ class HeldBody(Body):
     def start(self, v: LoopLevels, times: Times) -> np.ndarray:
         turning = 3 * times.largest[BODY_RATE] + 1e-5
         stored = 3 * times.largest[MOMENTUM] / self.inertia_kgm2 + turning  # the first sample may be a bad one
-        return np.array([3 * times.largest[ATTITUDE_ERROR] + 1e-4, *[turning] * 5, stored, v.error_slow_rad])
+        filtered = [turning] * 4 if self.late_s else []
+        return np.array([3 * times.largest[ATTITUDE_ERROR] + 1e-4, turning, stored, v.error_slow_rad, *filtered])
 
     def starting_levels(self, series) -> LoopLevels:
         by_row = {s.row: s for s in series}

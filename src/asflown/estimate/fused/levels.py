@@ -84,6 +84,11 @@ def fit_levels(body: Body, series: list[Series], known: Known | None = None) -> 
     return AxisFit(levels, tuple(series), count - sum(len(s.values) for s in series), offsets)
 
 
+def unfitted(body: Body, series: list[Series]) -> AxisFit:
+    """At levels from the series alone."""
+    return AxisFit(body.starting_levels(series), tuple(series), 0, {})
+
+
 def _without_outliers(body: Body, levels: Levels, series, known: Known | None, limit: float):
     """The series less what lies beyond ``limit``, worst first; as they are where there is nothing, or too much."""
     kept, most = series, _MOST_OUTLYING * sum(len(s.values) for s in series)
@@ -134,13 +139,13 @@ def _likelihood(body: Body, kind: type[Levels], p: np.ndarray, block: AxisData) 
     def model(q):
         return body.smooth_model(kind.from_logs(q), block.times)
 
-    here = model(p)
+    here, used = model(p), np.unique(block.data.row)
     found, slope = score(here, block.data), np.empty(len(p))
     for k in range(len(p)):
         step = np.zeros(len(p))
         step[k] = _STEP
         there = model(p + step)
-        if np.array_equal(there.H, here.H):
+        if np.array_equal(there.H[used], here.H[used]):
             slope[k] = found.along(here, there) / _STEP
         else:  # the score is not taken by H
             wide = step * (_WIDE_STEP / _STEP)

@@ -16,16 +16,20 @@ from scipy import optimize
 from ...kit.smoother import Model, log_likelihood, score
 from .body import AxisData, Levels
 
-#: An instant is an edge, about which the torque is free while its levels are fitted; it is a suspect, near which corners are looked for. [sigma]
-_EDGE, _SUSPECT = 5.0, 3.0
+#: An instant may be an edge, about which the torque is free while its levels are fitted; it is a suspect, near which corners are
+#: looked for. [sigma]
+_EDGE, _SUSPECT = 3.5, 2.5
 #: How far from a suspect corners are looked for, and how far from an edge the torque is free. [s]
 NEAR_S, _FREE_S = 15.0, 10.0
 #: By how much the torque's size is larger there.
 _FREELY = 30.0
 #: An edge makes its surroundings look like edges: the surest within this is taken, then they are looked at again. [s]
 _APART_S = 150.0
-#: Rounds of edges and levels; most suspects in an hour, the surest first.
-_ROUNDS, _MOST_AN_HOUR = 6, 40
+#: Edges are looked for under a torque this many times smaller than was fitted with them in it; so many are taken at once, if they
+#: are worth their price: the logarithm of one in ten minutes at a place known to its reach.
+_SMOOTHER, _AT_ONCE, _EDGE_COSTS = 4.0, 4, 3.4
+#: Most suspects in an hour, the surest first.
+_MOST_AN_HOUR = 15
 
 
 @dataclass(frozen=True)
@@ -39,14 +43,17 @@ class Suspects:
 
 def suspects(axis: AxisData) -> Suspects:
     """Of an axis whose known torque is taken off."""
-    levels, edges = axis.levels, np.empty(0)
-    for _ in range(_ROUNDS):
-        seconds, size = _kicks(axis, levels, edges, _APART_S)
-        more = seconds[size > _EDGE]
+    levels, edges, cost = axis.levels, np.empty(0), _cost(axis, axis.levels, np.empty(0))
+    for most in (_AT_ONCE, _AT_ONCE, 1):
+        smoother = replace(levels, torque_Nm=levels.torque_Nm / _SMOOTHER)
+        seconds, size = _kicks(axis, smoother, edges, _APART_S)
+        more = seconds[size > _EDGE][:most]
         if not len(more):
             break
-        edges = np.append(edges, more)
-        levels = _between(axis, levels, edges)
+        trial = np.append(edges, more)
+        found, then = _between(axis, smoother, trial)
+        if then + _EDGE_COSTS * len(more) < cost:
+            levels, edges, cost = found, trial, then
     seconds, size = _kicks(axis, levels, edges, NEAR_S)
     most = max(1, round(_MOST_AN_HOUR * np.ptp(axis.times.seconds) / 3600))
     return Suspects(np.append(edges, seconds[np.argsort(-size)[:most]]), edges, levels)
@@ -66,7 +73,7 @@ def _kicks(axis: AxisData, levels: Levels, edges: np.ndarray, apart_s: float) ->
     kick = np.abs(score(_model(axis, levels, edges), axis.data).kick[:, [axis.body.torque, axis.body.slope]]).max(axis=1)
     for t in edges:
         kick[np.abs(at - t) <= NEAR_S] = 0.0
-    kick[np.minimum(at - at[0], at[-1] - at) < 2.0] = 0.0  # the start is free as it is
+    kick[np.minimum(at - at[0], at[-1] - at) < NEAR_S] = 0.0  # the start is free as it is, and the end nearly so
     found = []
     left = np.flatnonzero(kick > _SUSPECT)
     while len(left):
@@ -76,18 +83,20 @@ def _kicks(axis: AxisData, levels: Levels, edges: np.ndarray, apart_s: float) ->
     return at[found], kick[found]
 
 
-def _between(axis: AxisData, levels: Levels, edges: np.ndarray) -> Levels:
-    """Levels whose torque is the most probable one between the edges; noises stay."""
-    middle, spread = axis.levels.logs()[:2], np.array(axis.body.SPREAD[:2])
+def _cost(axis: AxisData, levels: Levels, edges: np.ndarray) -> float:
+    """Less the log posterior of the torque's levels; noises stay."""
+    z = (levels.logs() - axis.levels.logs())[:2] / np.array(axis.body.SPREAD[:2])
+    found = 0.5 * z @ z - log_likelihood(_model(axis, levels, edges), axis.data)
+    return float(found) if np.isfinite(found) else 1e10
 
-    def cost(z):
-        size, length = np.exp(middle + spread * z)
-        found = log_likelihood(_model(axis, replace(levels, torque_Nm=size, length_s=length), edges), axis.data)
-        return 0.5 * z @ z - found if np.isfinite(found) else 1e10
 
-    start = (levels.logs()[:2] - middle) / spread
-    corners = start + np.array([[0, 0], [0.4, 0], [0, 0.4]])
-    how = {"maxfev": 60, "xatol": 0.02, "fatol": 0.1, "initial_simplex": corners}
-    z = optimize.minimize(cost, start, method="Nelder-Mead", options=how).x
-    size, length = np.exp(middle + spread * z)
-    return replace(levels, torque_Nm=float(size), length_s=float(length))
+def _between(axis: AxisData, start: Levels, edges: np.ndarray) -> tuple[Levels, float]:
+    """Levels whose torque is the most probable one between the edges, and their cost."""
+
+    def of(p) -> Levels:
+        return replace(start, torque_Nm=float(np.exp(p[0])), length_s=float(np.exp(p[1])))
+
+    corners = start.logs()[:2] + np.array([[0, 0], [0.7, 0], [0, 0.5]])
+    how = {"maxfev": 25, "xatol": 0.05, "fatol": 0.2, "initial_simplex": corners}
+    found = optimize.minimize(lambda p: _cost(axis, of(p), edges), corners[0], method="Nelder-Mead", options=how)
+    return of(found.x), float(found.fun)

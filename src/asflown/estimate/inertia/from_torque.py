@@ -31,6 +31,7 @@ from ...telemetry.telemetry import BRIDGED
 from .excitation import Excitation
 from .prior import MOMENT_SHARE, PRODUCT_SHARE, possible, prior_sigma
 from .result import Answer, Evidence
+from .surroundings import orbit_angle
 
 if TYPE_CHECKING:
     from ...telemetry.telemetry import Telemetry
@@ -127,7 +128,7 @@ def balance(telemetry: Telemetry) -> Balance:
         telemetry.channel(name)
     tai_ns, values = together(telemetry, names)
     cadence = int(np.median(np.diff(tai_ns))) if len(tai_ns) > 1 else 0
-    angle = _orbit_angle(values[:, 10:13])
+    angle = orbit_angle(values[:, 10:13])
     stretches = [
         _Stretch.of(seconds_since(tai_ns[s], telemetry.epoch_ns), values[s], angle[s])
         for s in segments(tai_ns, BRIDGED, cadence)
@@ -205,14 +206,6 @@ def _least_squares(rows) -> Balance:
     bread = np.linalg.pinv(flat.T @ flat, rcond=1e-14, hermitian=True)
     covariance = bread @ (sums.T @ sums) @ bread / np.outer(size, size)
     return Balance(solution[:9], covariance[:9, :9], {}, time_s, omega, y, residual)
-
-
-def _orbit_angle(position) -> np.ndarray:
-    """Along the orbit from the first position, in its plane. [rad]"""
-    r = position / np.linalg.norm(position, axis=1, keepdims=True)
-    normal = np.cross(r[:-1], r[1:]).sum(axis=0)
-    across = np.cross(normal / max(np.linalg.norm(normal), 1e-300), r[0])
-    return np.arctan2(r @ across, r @ r[0])
 
 
 def identifiable(found: Balance, sigma: np.ndarray) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -45,10 +45,15 @@ _BIAS_ALONE = 1e-5
 _SKEW_KICKED = 0.25
 #: Sigma of a lever of the surroundings, over the torque that is seen to act: wide, and finite where no motion tells it.
 _LEVER_SHARE = 10.0
+#: Where the search for the slow torque starts, over the torque that is seen to act, and its time: one that starts large takes the
+#: levers' part, and hands it back in many rounds. [s]
+_SLOW_SHARE, _SLOW_S = 0.01, 1000.0
 _SKEWS_TRIED = np.arange(-8.0, 8.01, 0.5)
 _MOST_ROUNDS = 20
 #: Sigmas the answer may still move by in the last round.
 _SETTLED = 0.05
+#: Share that the tensor's sigmas may still change by: a level that dwindles to nothing need not be followed there.
+_STEADY = 0.02
 #: From this round on the constants are so nearly right that levels are fitted with them held, three times faster.
 _NEARLY = 3
 _TURNS = 8  # of the first round, in which the corners are found
@@ -83,9 +88,13 @@ class SlewFit:
 
     @property
     def criterion(self) -> float:
-        """BIC; less is better.  A step has its instant and three components, a slow torque its size, its time and its levers."""
-        slow = 2 + 3 * self.record.levers if self.record.slow else 0
-        return information_criterion(self.weighted, self.levels, self.around, 4 * len(self.record.steps) + slow)
+        """BIC; less is better.  A step has its instant and three components, a slow torque its size and its time.  The levers have a
+        prior, so they cost what the data narrow them by."""
+        levers = slice(self.layout.torque.stop, self.layout.pushes.stop)
+        narrowed = self.covariance[levers, levers] @ self.around.information[levers, levers]
+        parameters = 4 * len(self.record.steps) + (2 if self.record.slow else 0)
+        found = information_criterion(self.weighted, self.levels, self.around, parameters)
+        return found - float(np.linalg.slogdet(narrowed)[1])
 
     @property
     def motion(self) -> Motion:
@@ -120,14 +129,16 @@ def fit_slews(
     Raises BadInput where the record tells nothing of the tensor."""
     task = _Task.of(record, frame, prior, np.eye(3) if seen is None else seen, levels)
     state = task.start(prior)
+    sigma = np.full(6, np.inf)
     for number in range(1, _MOST_ROUNDS + 1):
         if progress is not None:
             progress(f"round {number}")
         fit = task.round(state, number)
         moved = np.max(np.abs(fit.moved) / fit.sigma)
-        if moved < 0.5 * _SETTLED and (levels is not None or _near(state.levels, fit.levels)):
+        changed = np.max(np.abs(fit.sigma[Layout.TENSOR] / sigma - 1))
+        if moved < 0.5 * _SETTLED and (levels is not None or changed < _STEADY):
             break
-        state = _State.after(fit)
+        state, sigma = _State.after(fit), fit.sigma[Layout.TENSOR]
     return replace(fit, converged=bool(moved < _SETTLED))
 
 
@@ -168,9 +179,10 @@ class _Task:
         first = replace(first, **{n: max(getattr(first, n), 2 * v) for n, v in floors(record).items()})
         if record.wanders:
             first = replace(first, kick=first.rate, wander=first.wheel * float(np.median(record.momentum.unit)))
-        elif record.slow:
-            first = replace(first, slow=_slow_torque(record))
-        weight, centre = prior_of_all(Layout.of(record), prior, skew, _LEVER_SHARE * first.slow)
+        seen_Nm = _torque_seen(record) if record.slow else 0.0
+        if record.slow:
+            first = replace(first, slow=_SLOW_SHARE * seen_Nm, slow_s=_SLOW_S)
+        weight, centre = prior_of_all(Layout.of(record), prior, skew, _LEVER_SHARE * seen_Nm)
         return cls(record, frame, seen, weight, centre, first, known)
 
     def start(self, prior: Prior | None) -> _State:
@@ -235,13 +247,7 @@ def carried(loosened: np.ndarray, old: Motion, new: Motion) -> np.ndarray:
     return loosened[np.clip(np.searchsorted(old.time_s, new.time_s), 0, len(loosened) - 1)]
 
 
-def _near(a: Levels, b: Levels) -> bool:
-    return all(
-        abs(np.log(getattr(b, n) / getattr(a, n))) < 0.03 for n in ("wheel", "rate", "attitude", "coloured")
-    ) and all(abs(getattr(b, n) - getattr(a, n)) <= 0.05 * getattr(a, n) for n in ("wander", "slow"))
-
-
-def _slow_torque(record: SlewRecord) -> float:
+def _torque_seen(record: SlewRecord) -> float:
     """About the size of an outside torque that would explain what plain least squares of momentum leaves over. [N m]"""
     m = record.momentum
     left = np.sqrt(plain_fit(record)[1] / len(m.time_s))

@@ -38,11 +38,11 @@ def compare(white: Whitened, sources: tuple[str, ...]) -> tuple[Model, ...]:
         best = posterior(white, subset, _CELLS)
         free = sum(names.count(s) for s in subset) + 2 * ("drag" in subset)
         bic.append(-2 * best.log_best + free * np.log(n))
-        foretold.append(_foretold(white, subset, best.swing[int(np.argmax(best.weight))], best.kept | ~looked_for(white.arc)))
+        foretold.append(
+            _foretold(white, subset, best.swing[int(np.argmax(best.weight))], best.kept | ~looked_for(white.arc))
+        )
     order = np.argsort(bic)
-    return tuple(
-        Model(subsets[k], float(bic[k] - min(bic)), float(max(foretold) - foretold[k])) for k in order
-    )
+    return tuple(Model(subsets[k], float(bic[k] - min(bic)), float(max(foretold) - foretold[k])) for k in order)
 
 
 def _foretold(white: Whitened, subset: tuple[str, ...], swing: np.ndarray, kept: np.ndarray) -> float:

@@ -50,8 +50,8 @@ STEPS = Kind(
 )  # fmt: skip
 NO_CONSTANT = Kind(
     "sources.no-constant", Severity.NOTE,
-    "a constant torque is left out: the record is explained without it (BIC lower by {bic:.0f}). With one, {what} would be known {factor:.0f} "
-    "times worse",
+    "a constant torque is left out: it would explain no more than chance does (p = {p_value:.2g}). With one, {what} would be known "
+    "{factor:.0f} times worse",
     "Give --sources with constant to have it in.",
 )  # fmt: skip
 SIMPLER = Kind(
@@ -93,7 +93,9 @@ def _noise(white: Whitened, residual: Residual) -> list[Doubt]:
         doubts.append(NOT_NOISE(axes=axes, p_value=float(residual.white_p.min())))
     ratio = white.levels.white
     if (ratio > _NOISIER).any():
-        doubts.append(NOISIER(axes=[a for a, r in zip(AXES, ratio, strict=True) if r > _NOISIER], ratio=float(ratio.max())))
+        doubts.append(
+            NOISIER(axes=[a for a, r in zip(AXES, ratio, strict=True) if r > _NOISIER], ratio=float(ratio.max()))
+        )
     if len(residual.jumps_s):
         doubts.append(STEPS(count=len(residual.jumps_s), first_s=float(residual.jumps_s[0])))
     return doubts

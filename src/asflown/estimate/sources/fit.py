@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.stats import chi2
 
 from ...kit.doubts import Doubt, Doubts
 from ...kit.errors import BadInput, check_choice
@@ -12,7 +13,7 @@ from ...kit.result import recorded
 from ..subject import PER_SPIN_INERTIA, subject_of
 from .compare import Model, compare
 from .doubts import NO_CONSTANT, fit_doubts
-from .gather import DENSITY, Arc, gather, with_harmonics
+from .gather import ALONE, DENSITY, Arc, gather, with_harmonics
 from .residual import residual_of
 from .result import Fitted, SourcesResult
 from .swing import Posterior, posterior
@@ -24,12 +25,14 @@ if TYPE_CHECKING:
 
     from ...craft.model import Craft
     from ...telemetry.telemetry import Telemetry
-    from ..subject import Subject
     from ..environment import Air
+    from ..subject import Subject
 
 SOURCES = ("dipole", "sunlight", "drag", "constant")
-#: A constant torque is left out where the BIC is lower by this without it.
-CONSTANT_COSTS = 6.0
+#: A constant torque is in the model where it explains more than chance would in one record of twenty (likelihood ratio).
+_BY_CHANCE = 0.05
+#: Rounds in which the density's harmonics follow the lever, and cells of the swing's grid in them.
+_ROUNDS, _CELLS = 3, 16
 #: A component is told where the data leave less than this share of what was open before.
 _TOLD = 0.7
 
@@ -54,7 +57,7 @@ def sources(
         Inertia, wheels; ``orbit`` where the telemetry has no positions.
     which : sequence of str, optional
         Sources looked for, of 'dipole', 'sunlight', 'drag', 'constant'; by default all whose vectors are known, the constant torque
-        only where the record asks for it (BIC).
+        only where the record asks for it (likelihood ratio, p < 0.05).
     without : sequence of str
         Sources left out.
     air : Air, optional
@@ -83,20 +86,32 @@ def sources(
     fitted = tuple(n for n in asked if arc.of(n).any())
     if not fitted:
         raise BadInput(
-            "none of the sources asked for can be looked for: " + "; ".join(f"{n} needs {w}" for n, w in arc.environment.left_out.items()),
+            "none of the sources asked for can be looked for: "
+            + "; ".join(f"{n} needs {w}" for n, w in arc.environment.left_out.items()),
             file=telemetry.source or None,
             remedy="Add these channels.",
         )
-    white = whitened(arc)
-    if "drag" in fitted:
-        first = posterior(white, tuple(n for n in fitted if n != "constant")).whole(white)
-        drag = arc.of("drag")
-        white = whitened(with_harmonics(arc, arc.torque[:, :, drag] @ first[drag], modelled=air is not None))
+    white = _whitened(arc, fitted, modelled=air is not None)
     models = compare(white, fitted)
     chosen: list[Doubt] = []
     if which is None and "constant" in fitted:
         fitted, chosen = _needed(white, models, fitted)
     return _result(subject, white, fitted, models, asked, chosen)
+
+
+def _whitened(arc: Arc, fitted: tuple[str, ...], *, modelled: bool) -> Whitened:
+    """With the density's higher harmonics, which are those of the lever found: of each axis' own first, then of the lever, again and again."""
+    if "drag" not in fitted:
+        return whitened(arc)
+    drag = arc.of("drag")
+    per_lever = arc.torque[:, :, drag]
+    # a lever as large as the torque that is seen, until one is known
+    white = whitened(with_harmonics(arc, per_lever / ALONE, modelled=modelled))
+    least = tuple(n for n in fitted if n != "constant")
+    for _ in range(_ROUNDS):
+        lever = posterior(white, least, _CELLS).whole(white)[: len(drag)][drag]
+        white = whitened(with_harmonics(arc, (per_lever @ lever)[:, :, None], modelled=modelled), white.levels)
+    return white
 
 
 def _result(
@@ -136,22 +151,25 @@ def _result(
     )
 
 
-def _needed(
-    white: Whitened, models: tuple[Model, ...], fitted: tuple[str, ...]
-) -> tuple[tuple[str, ...], list[Doubt]]:
-    """The sources without the constant torque where the record is better explained without it, and what that hides."""
+def _needed(white: Whitened, models: tuple[Model, ...], fitted: tuple[str, ...]) -> tuple[tuple[str, ...], list[Doubt]]:
+    """The sources without the constant torque where it explains no more than chance would, and what that hides."""
     without = tuple(n for n in fitted if n != "constant")
     bic = {frozenset(m.sources): m.bic_above_best for m in models}
-    more = bic[frozenset(fitted)] - bic[frozenset(without)]
-    if more < CONSTANT_COSTS or not without:
+    if not without:
+        return fitted, []
+    free = int(white.arc.of("constant").sum())
+    gain = bic[frozenset(without)] - bic[frozenset(fitted)] + free * np.log(white.kept.sum())
+    chance = float(chi2.sf(gain, free))
+    if chance < _BY_CHANCE:
         return fitted, []
     names = white.arc.columns
-    kept = [(c, k) for k, c in enumerate(np.flatnonzero(posterior(white, without).kept)) if names[c].source in without]
+    kept = [(int(c), k) for k, c in enumerate(np.flatnonzero(posterior(white, without).kept)) if names[c].source in without]
     one, other = posterior(white, without), posterior(white, fitted)
     place = {int(c): k for k, c in enumerate(np.flatnonzero(other.kept))}
-    wider = [(np.sqrt(other.spread[place[c], place[c]] / one.spread[k, k]), names[c]) for c, k in kept]
+    with_it, without_it = np.diag(other.spread), np.diag(one.spread)
+    wider = [(np.sqrt(with_it[place[c]] / without_it[k]), names[c]) for c, k in kept]
     factor, column = max(wider, key=lambda w: w[0])
-    return without, [NO_CONSTANT(bic=more, factor=float(factor), what=words(column))]
+    return without, [NO_CONSTANT(p_value=chance, factor=float(factor), what=words(column))]
 
 
 def _told(arc: Arc, found: Posterior) -> dict[int, Told]:
@@ -206,7 +224,10 @@ def _contributions(arc: Arc, theta: np.ndarray, fitted: tuple[str, ...]) -> dict
         if name == "drag":
             use |= np.array([c.name.startswith(DENSITY) for c in arc.columns])
         made[name] = arc.torque[:, :, use] @ theta[use]
-    for name, columns in (("gravity-gradient", arc.of("inertia")), ("rods", np.array([c.name == "rods" for c in arc.columns]))):
+    for name, columns in (
+        ("gravity-gradient", arc.of("inertia")),
+        ("rods", np.array([c.name == "rods" for c in arc.columns])),
+    ):
         if name in made:
             made[name] = made[name] + arc.torque[:, :, columns] @ theta[columns]
     return made

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from ...dynamics.rigid_body import momentum_regressor
-from ...kit.doubts import Doubts, Kind, Severity
+from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput, some_of
 from ...kit.rotations import rates_between, turned_by
 from ...kit.scatter import difference_sigma, robust_sigma
@@ -39,10 +39,10 @@ _GAP_S = 60.0
 _BIAS = 5e-6
 #: A source alone may exert so many times the torque that is seen (rms), one sigma: sources seldom cancel to less than a third.
 ALONE = 3.0
-#: One sigma of the density's second and third harmonic over the orbit, as shares of its mean: the day's bulge is no sine. Without a model
-#: of the air, and with one.
-_HARMONICS, _HARMONICS_MODELLED = (0.1, 0.05), (0.03, 0.02)
-#: The penumbra's middle is known to this. [s]  It lasts 8 s in low orbit and longer where the craft grazes the shadow.
+#: One sigma of the density's second to fourth harmonic over the orbit, as shares of its mean: the day's bulge is no sine
+#: (studies/density_harmonics.py).  Without a model of the air; with one a fifth of it.
+_HARMONICS, _MODELLED = (0.14, 0.035, 0.03), 0.2
+#: The penumbra's middle is known to this, or to half its length where that is longer. [s]  It lasts 8 s in low orbit.
 _EDGE_S = 4.0
 
 ATTITUDE_FROM_RATES = Kind(
@@ -135,7 +135,11 @@ def gather(subject: Subject, which: Sequence[str], air: Air | None) -> Arc:
     around = environment_of(subject, course.tai_ns, air=air)
     t = course.seconds
     block = _blocks(t)
-    known = {t_.name: t_.torque_Nm for t_ in around.terms if t_.name in ("gravity-gradient", "rods") and t_.torque_Nm is not None}
+    known = {
+        t_.name: t_.torque_Nm
+        for t_ in around.terms
+        if t_.name in ("gravity-gradient", "rods") and t_.torque_Nm is not None
+    }
     brought = _grown(course, sum(known.values(), np.zeros((len(t), 3)))[:, :, None])[:, :, 0]
     momentum = course.momentum - brought
     size = _size(course, momentum)
@@ -153,13 +157,15 @@ def gather(subject: Subject, which: Sequence[str], air: Air | None) -> Arc:
     )  # fmt: skip
 
 
-def with_harmonics(arc: Arc, lever_torque: np.ndarray, modelled: bool) -> Arc:
-    """The arc with higher harmonics of the density among its unknowns, each a torque as drag's (K, 3) that swings faster."""
+def with_harmonics(arc: Arc, drag: np.ndarray, *, modelled: bool) -> Arc:
+    """The arc with higher harmonics of the density among its unknowns, each a torque as drag's that swings faster.
+
+    ``drag`` (K, 3, l): torque at the mean density; of one lever, or per lever of each axis where none is known yet."""
     phase = arc.phase
     assert phase is not None
-    sizes = _HARMONICS_MODELLED if modelled else _HARMONICS
-    shares = [s * f(k * phase) for k, s in zip((2, 3), sizes, strict=True) for f in (np.cos, np.sin)]
-    torque = lever_torque[:, :, None] * np.stack(shares, axis=1)[:, None, :]
+    sizes = np.array(_HARMONICS) * (_MODELLED if modelled else 1.0)
+    shares = [s * f(k * phase) for k, s in enumerate(sizes, 2) for f in (np.cos, np.sin)]
+    torque = np.concatenate([drag * share[:, None, None] for share in shares], axis=2)
     grown = cumulative_trapezoid(arc.turn @ torque, arc.time_s, axis=0, initial=0)
     columns = tuple(Column("", f"{DENSITY} {k}", "", 1.0) for k in range(torque.shape[2]))
     Z = np.concatenate([arc.Z, np.swapaxes(arc.turn, 1, 2) @ grown], axis=2)
@@ -185,14 +191,16 @@ def _blocks(t: np.ndarray) -> np.ndarray:
 def _course(subject: Subject) -> _Course:
     I_B = subject.known_inertia()
     tlm = subject.telemetry
-    doubts: list = []
+    doubts: list[Doubt] = []
     if not (tlm.members("wheel_rate") or tlm.has_axes("wheel_momentum")) and tlm.has_axes("control_torque"):
         names = [f"{stem}_{a}" for stem in ("body_rate", "control_torque") for a in AXES]
         if not tlm.has_axes("body_rate"):
             raise BadInput("body rates are not in the telemetry", channel="body_rate_x", remedy="Add them.")
         tai_ns, values = together(tlm, names)
         if len(tai_ns) < FEWEST:
-            raise BadInput("too few instants at which rates and control torque are known", remedy="Take a longer record.")
+            raise BadInput(
+                "too few instants at which rates and control torque are known", remedy="Take a longer record."
+            )
         rates, pushed, each = values[:, :3], values[:, 3:], np.zeros((len(tai_ns), 0, 3))
         doubts.append(ACTUATORS_TORQUE())
     else:
@@ -200,7 +208,7 @@ def _course(subject: Subject) -> _Course:
         if s.rates is None:
             raise BadInput("body rates are not in the telemetry", channel="body_rate_x", remedy="Add them.")
         tai_ns, rates, each, pushed = s.tai_ns, s.rates, s.each, None
-        doubts += s.doubts
+        doubts = [*s.doubts]
     t = (tai_ns - tai_ns[0]) / NS
     R = attitude_at(tlm, tai_ns)
     turn, bias, bias_sigma = rates, np.zeros(3), _BIAS
@@ -267,11 +275,21 @@ def _columns(subject: Subject, course: _Course, around: Environment, which: Sequ
         term = around.term(name)
         if name in which and term is not None:
             per_unit = float(np.sqrt(np.mean(np.sum(term.design**2, axis=(1, 2))) / 2))
-            add(name, list(AXES), term.unit, ALONE * size / max(per_unit, 1e-300) if name == "dipole" else ALONE * size, term.design)
+            add(
+                name,
+                list(AXES),
+                term.unit,
+                ALONE * size / max(per_unit, 1e-300) if name == "dipole" else ALONE * size,
+                term.design,
+            )
     term = around.term("drag")
     if "drag" in which and term is not None and around.phase_rad is not None:
         # the swing of the density: lever x cosine and sine of the way round the orbit (see swing)
-        for source, share in (("drag", 1.0), ("drag cos", np.cos(around.phase_rad)), ("drag sin", np.sin(around.phase_rad))):
+        for source, share in (
+            ("drag", 1.0),
+            ("drag cos", np.cos(around.phase_rad)),
+            ("drag sin", np.sin(around.phase_rad)),
+        ):
             add(source, list(AXES), "N m", ALONE * size, term.design * np.reshape(share, (-1, 1, 1)))
     if "constant" in which:
         add("constant", list(AXES), "N m", ALONE * size, np.broadcast_to(np.eye(3), (n, 3, 3)))
@@ -279,21 +297,39 @@ def _columns(subject: Subject, course: _Course, around: Environment, which: Sequ
     G = None if gravity is None else gravity.design
     add("inertia", list(gravity.labels) if gravity else [], "kg m2", inertia_sigma(subject) if gravity else [], G,
         -momentum_regressor(course.turn) if gravity else None)  # fmt: skip
-    if around.term("rods") is not None:
-        add("", ["rods"], "", 0.05, around.term("rods").design)
+    rods = around.term("rods")
+    if rods is not None:
+        add("", ["rods"], "", 0.05, rods.design)
     if course.each.shape[1]:
         spin = SPIN_SHARE if not subject.relative else 1e-6
-        add("", [f"spin inertia {k}" for k in range(course.each.shape[1])], "", spin, momentum=-np.swapaxes(course.each, 1, 2))
+        add(
+            "",
+            [f"spin inertia {k}" for k in range(course.each.shape[1])],
+            "",
+            spin,
+            momentum=-np.swapaxes(course.each, 1, 2),
+        )
     bias = np.broadcast_to(subject.known_inertia(), (n, 3, 3))
     add("", [f"gyro bias {a}" for a in AXES], "rad/s", course.bias_sigma, momentum=bias)
     return tuple(columns), np.concatenate(torques, axis=2), np.concatenate(direct, axis=2)
+
+
+def _penumbra(middle: np.ndarray, lit: np.ndarray, edge: int) -> float:
+    """How long the light takes to go at an edge of the shadow; long where the craft grazes it. [s]
+
+    The Earth's flattening, which the geometry leaves out, is as wide as the penumbra."""
+    whole = np.flatnonzero((lit < 0.02) | (lit > 0.98))
+    before, after = whole[whole <= edge], whole[whole > edge]
+    first, last = (before[-1] if len(before) else 0), (after[0] if len(after) else len(lit) - 1)
+    return float(middle[last] - middle[first]) - float(np.median(np.diff(middle)))
 
 
 def _jumps(middle: np.ndarray, momentum: np.ndarray, lit: np.ndarray | None, size: float, t: np.ndarray) -> np.ndarray:
     """Variance of a step of momentum before each block: past a gap any, past the shadow's edge what the edge's place leaves open."""
     jump = np.zeros(len(middle))
     if lit is not None:
-        jump[1:] = ((np.diff(lit > 0.5)) != 0) * (_EDGE_S * size) ** 2
+        for edge in np.flatnonzero(np.diff(lit > 0.5)):
+            jump[edge + 1] = (max(_EDGE_S, 0.5 * _penumbra(middle, lit, int(edge))) * size) ** 2
     gaps = t[np.flatnonzero(np.diff(t) > max(_GAP_S, 6 * float(np.median(np.diff(t)))))]
     for at in gaps:
         jump[np.searchsorted(middle, at, side="right").clip(max=len(jump) - 1)] = float(np.max(momentum**2)) + 1e-300

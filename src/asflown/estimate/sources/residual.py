@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -52,7 +53,7 @@ def residual_of(white: Whitened, theta: np.ndarray) -> Residual:
     middle = np.array([arc.time_s[p].mean() for p in parts])
     noise = np.array([variance[p].mean(axis=0) / len(p) for p in parts])
     step = np.diff(middle)
-    whole = np.array([not (arc.jump[a[0] + 1 : b[-1] + 1] > 0).any() for a, b in zip(parts[:-1], parts[1:], strict=True)])
+    whole = np.array([not (arc.jump[a[0] + 1 : b[-1] + 1] > 0).any() for a, b in pairwise(parts)])
     torque_N = np.diff(mean, axis=0) / step[:, None]
     at = np.array([arc.turn[p[-1]] for p in parts[:-1]])
     torque = np.einsum("wji,wj->wi", at, torque_N)

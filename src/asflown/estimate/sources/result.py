@@ -61,7 +61,9 @@ class SourcesRecord(TypedDict):
     drag_lever_ci95_Nm: Annotated[Intervals | None, Doc("three [low, high]")]
     constant_Nm: Annotated[Vector | None, Doc("constant torque in body axes")]
     constant_ci95_Nm: Annotated[Intervals | None, Doc("three [low, high]")]
-    inertia_correction: Annotated[InertiaSeenRecord | None, Doc("of the craft file's, as gravity gradient and turn see it")]
+    inertia_correction: Annotated[
+        InertiaSeenRecord | None, Doc("of the craft file's, as gravity gradient and turn see it")
+    ]
     density_swing: SwingRecord | None
     correlations: Annotated[dict[str, dict[str, Number]], Doc("between all unknowns, such as 'dipole x'")]
     untold: Annotated[list[str], Doc("sentences: what this arc cannot tell")]
@@ -70,7 +72,9 @@ class SourcesRecord(TypedDict):
     contributions: Annotated[dict[str, Rows], Doc("torque of each source at time_s, N x 3 [N m]; known ones too")]
     torque_Nm: Annotated[Rows, Doc("N x 3: the sum of the contributions and of the residual")]
     lit: Annotated[Numbers | None, Doc("share of the Sun that is seen")]
-    residual_rms_Nm: Annotated[Number, Doc("root of the mean square of the residual torque, of the three axes together")]
+    residual_rms_Nm: Annotated[
+        Number, Doc("root of the mean square of the residual torque, of the three axes together")
+    ]
     residual_noise_rms_Nm: Annotated[Number, Doc("what the readings' noise alone makes of it")]
     residual_time_s: Numbers
     residual_Nm: Annotated[Rows, Doc("mean residual torque over windows, W x 3")]
@@ -152,10 +156,13 @@ class SourcesResult(Estimate):
         return float(np.linalg.norm(self.residual.rms_Nm))
 
     def _record(self) -> dict:
-        in_torque = {}
+        in_torque: dict = {}
         for name, key in (("sunlight", "sunlight_lever"), ("drag", "drag_lever"), ("constant", "constant")):
             of = self.found.get(name)
-            in_torque |= {f"{key}_Nm": None if of is None else of.stated, f"{key}_ci95_Nm": None if of is None else of.ci95}
+            in_torque |= {
+                f"{key}_Nm": None if of is None else of.stated,
+                f"{key}_ci95_Nm": None if of is None else of.ci95,
+            }
         dipole = None if self.relative else self.found.get("dipole")
         r = self.residual
         rest = {
@@ -174,7 +181,11 @@ class SourcesResult(Estimate):
             "correlations": self.correlations,
             "untold": list(self.untold),
             "models": [
-                {"sources": list(m.sources), "bic_above_best": m.bic_above_best, "held_back_below_best": m.held_back_below_best}
+                {
+                    "sources": list(m.sources),
+                    "bic_above_best": m.bic_above_best,
+                    "held_back_below_best": m.held_back_below_best,
+                }
                 for m in self.models
             ],
             "time_s": self.time_s,
@@ -207,7 +218,9 @@ class SourcesResult(Estimate):
         if self.phase_rad is not None:
             span += f", {self.phase_rad[-1] / (2 * np.pi):.2f} orbits"
         title = f"Sources of the torque · {self.craft} · epoch {self.epoch}\n  {span}"
-        return Table(title, self._rows(), ("source", "", "value", "95 % interval", "rms torque"), self._remarks()), self._models()
+        return Table(
+            title, self._rows(), ("source", "", "value", "95 % interval", "rms torque"), self._remarks()
+        ), self._models()
 
     def _rows(self) -> tuple[tuple[str, ...], ...]:
         rows = []
@@ -233,16 +246,19 @@ class SourcesResult(Estimate):
         left, noise = self.residual_rms_Nm, float(np.linalg.norm(self.residual.noise_Nm))
         factor, label = scaled_unit(left, unit)
         window = float(np.median(np.diff(self.residual.time_s)))
-        remarks = [f"residual torque {factor * left:.3g} {label} rms over {window:.0f} s, of which noise {factor * noise:.3g} {label}"]
+        remarks = [
+            f"residual torque {factor * left:.3g} {label} rms over {window:.0f} s, of which noise {factor * noise:.3g} {label}"
+        ]
         if self.swing is not None:
-            remarks.append(f"density swings by {100 * self.swing['amplitude']:.0f} ± {100 * self.swing['amplitude_sigma']:.0f} % over the orbit")
+            remarks.append(
+                f"density swings by {100 * self.swing['amplitude']:.0f} ± {100 * self.swing['amplitude_sigma']:.0f} % over the orbit"
+            )
         remarks += [f"{n}: {w}" for n, w in self.where_from.items()]
         return (*remarks, *self.untold)
 
     def _models(self) -> Table:
         rows = tuple(
-            (", ".join(m.sources) or "none", f"{m.bic_above_best:.1f}", f"{m.held_back_below_best:.1f}") for m in self.models[:5]
+            (", ".join(m.sources) or "none", f"{m.bic_above_best:.1f}", f"{m.held_back_below_best:.1f}")
+            for m in self.models[:5]
         )
         return Table("Sets of sources, the best first", rows, ("sources", "BIC above", "held back, log odds below"))
-
-

@@ -57,7 +57,11 @@ class Posterior:
         tail = (1 - share) / 2
 
         def quantile(q):
-            return float(optimize.brentq(lambda x: float(self.weight @ ndtr((x - m) / s)) - q, low, high, xtol=1e-10 * (high - low)))
+            return float(
+                optimize.brentq(
+                    lambda x: float(self.weight @ ndtr((x - m) / s)) - q, low, high, xtol=1e-10 * (high - low)
+                )
+            )
 
         return quantile(tail), quantile(1 - tail)
 
@@ -73,7 +77,8 @@ class Posterior:
         rest = ~looked_for(arc)
         N = white.information[1:, 1:]
         mean[rest] = np.linalg.solve(
-            N[np.ix_(rest, rest)] + np.eye(int(rest.sum())), white.information[1:, 0][rest] - N[np.ix_(rest, ~rest)] @ mean[~rest]
+            N[np.ix_(rest, rest)] + np.eye(int(rest.sum())),
+            white.information[1:, 0][rest] - N[np.ix_(rest, ~rest)] @ mean[~rest],
         )
         return mean
 

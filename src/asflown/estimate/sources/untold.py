@@ -44,9 +44,11 @@ def untold_in(arc: Arc, found: Posterior, told: dict[int, Told], fitted: tuple[s
                     f"This arc cannot tell {words(arc.columns[a])} from {words(arc.columns[b])}: correlation {r:+.3f}."
                 )
                 spoken |= {a, b}
-    for c in looked_for:
-        if not told[c].told and c not in spoken:
-            sentences.append(f"This arc cannot tell {words(arc.columns[c])}: {_why(arc, found, told, c, C, looked_for)}.")
+    sentences += [
+        f"This arc cannot tell {words(arc.columns[c])}: {_why(arc, told, c, C, looked_for)}."
+        for c in looked_for
+        if not told[c].told and c not in spoken
+    ]
     open_ = [arc.columns[c].name for c in told if arc.columns[c].source == "inertia" and not told[c].told]
     if open_:
         sentences.append(
@@ -59,7 +61,7 @@ def words(column: Column) -> str:
     return _WORDS[column.source].format(column.name)
 
 
-def _why(arc: Arc, found: Posterior, told: dict[int, Told], c: int, C: np.ndarray, looked_for: list[int]) -> str:
+def _why(arc: Arc, told: dict[int, Told], c: int, C: np.ndarray, looked_for: list[int]) -> str:
     others = [o for o in looked_for if o != c]
     if others:
         nearest = max(others, key=lambda o: abs(C[told[c].place, told[o].place]))
@@ -69,4 +71,8 @@ def _why(arc: Arc, found: Posterior, told: dict[int, Told], c: int, C: np.ndarra
     column = arc.torque[:, :, c]
     swings = np.sqrt(np.mean(np.sum(column**2, axis=1)))
     most = arc.size_Nm * 3
-    return "it exerts next to no torque here" if swings < 0.1 * most else "it changes too little over the arc beside what else is open"
+    return (
+        "it exerts next to no torque here"
+        if swings < 0.1 * most
+        else "it changes too little over the arc beside what else is open"
+    )

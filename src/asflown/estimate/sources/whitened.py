@@ -1,6 +1,6 @@
 """The arc whitened: momentum of an unexplained slow torque, noise of the readings, and their sizes by likelihood.
 
-    u' = R tau,   tau' = -tau / L + noise  (size s),   y = Z theta + R^T u + e
+u' = R tau,   tau' = -tau / L + noise  (size s),   y = Z theta + R^T u + e
 """
 
 from __future__ import annotations
@@ -63,10 +63,11 @@ class Whitened:
         return smooth(self.steps, self.filtered, theta).mean[:, 3:]
 
 
-def whitened(arc: Arc) -> Whitened:
-    """At the levels of the largest restricted likelihood, without outliers."""
+def whitened(arc: Arc, near: Levels | None = None) -> Whitened:
+    """At the levels of the largest restricted likelihood, looked for from ``near``; without outliers."""
     kept = np.ones((len(arc.time_s), 3), bool)
-    levels = _likeliest(arc, kept, Levels(np.ones(3), 0.1 * arc.size_Nm, 0.1 * float(np.ptp(arc.time_s))))
+    near = near or Levels(np.ones(3), 0.1 * arc.size_Nm, 0.1 * float(np.ptp(arc.time_s)))
+    levels = _likeliest(arc, kept, near)
     for _ in range(3):
         whole = _at(arc, levels, kept)
         theta = _solve(whole.filtered.information)

@@ -14,11 +14,15 @@ from ..subject import PER_SPIN_INERTIA, Subject, subject_of
 from .answer import Answer, Method
 from .choice import method_called
 from .consistency import consistency
+from .known import check_known, without_known
 from .result import TorqueResult
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ...craft.model import Craft
     from ...telemetry.telemetry import Telemetry
+    from ..environment import Air
 
 NOTHING_CHANGES = Kind(
     "torque.nothing-changes", Severity.VOID,
@@ -48,6 +52,8 @@ def torque(
     loop: str | None = None,
     considered: dict[str, float] | None = None,
     moving: str | None = "auto",
+    known: Sequence[str] = (),
+    air: Air | None = None,
 ) -> TorqueResult:
     """The torque on the body that the actuators did not command, in body axes.
 
@@ -80,6 +86,11 @@ def torque(
         One sigma of what the fused method takes as known: inertia, spin_inertia, kp, kd, control_torque (shares), delay_s [s].
     moving : str or None
         Mechanism whose inertia is taken off; 'auto': the one whose angle is seen to move; None: no mechanism moves.
+    known : sequence of str
+        Torques of the surroundings that are taken off: 'gravity-gradient', 'sunlight', 'dipole', 'drag', 'rods', as the craft file has
+        them; their uncertainty goes into the band.
+    air : Air, optional
+        F10.7 of the day before, its 81-day mean and Ap for the density of the drag; without it the density falls exponentially.
 
     Returns
     -------
@@ -89,7 +100,7 @@ def torque(
     Raises
     ------
     BadInput
-        For options that the method does not take, and where the telemetry lacks what the method needs, names wheels the craft
+        For options that the method does not take, for a known torque that cannot be computed, and where the telemetry lacks what the method needs, names wheels the craft
         does not have, or is shorter than the window.
     """
     options = {
@@ -107,7 +118,9 @@ def torque(
         )  # fmt: skip
     elif variant != "corrected" or any(v is not None for v in options.values()):
         raise BadInput("a method object has its own options", remedy="Give them to the object: Momentum(window_s=20).")
-    return torque_of(subject_of(telemetry, craft, moving), method, axis)
+    names, subject = check_known(known), subject_of(telemetry, craft, moving)
+    result = torque_of(subject, method, axis)
+    return without_known(result, subject, names, air) if names else result
 
 
 def torque_of(subject: Subject, method: Method, axis: str = "all") -> TorqueResult:

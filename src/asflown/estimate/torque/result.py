@@ -20,6 +20,7 @@ from ..fused import PEAK_REACH_S, AxisData, excursions, heights
 
 if TYPE_CHECKING:
     from ..firing import Gained
+    from .known import KnownTorque
 
 Column = Annotated[Numbers | Rows, Doc("one number an instant; for all axes three")]
 
@@ -42,6 +43,15 @@ class ImpulseRecord(TypedDict):
     axis: str
     impulse_Nms: Number
     impulse_sigma_Nms: Number
+
+
+class KnownRecord(TypedDict):
+    """A torque of the surroundings that was taken off."""
+
+    name: Annotated[str, Doc("gravity-gradient, sunlight, dipole, drag or rods")]
+    source: Annotated[str, Doc("where its vectors are from")]
+    torque_Nm: Column
+    torque_sigma_Nm: Annotated[Column, Doc("one sigma, by the craft file; it is in the torque's own")]
 
 
 class FitRecord(TypedDict):
@@ -75,6 +85,7 @@ class TorqueRecord(TypedDict):
     peaks: list[PeakRecord]
     settings: dict
     impulses: NotRequired[list[ImpulseRecord]]
+    known: NotRequired[Annotated[list[KnownRecord], Doc("with --with: what was taken off")]]
     fits: NotRequired[list[FitRecord]]
     comparison: NotRequired[Annotated[list[dict], Doc("with --compare: every other method against this one")]]
     torque_per_spin_inertia_rad_s2: NotRequired[Column | None]
@@ -133,7 +144,7 @@ class TorqueResult(Estimate):
     telemetry's epoch.  ``paths_Nm``: (K, F, 3), torques drawn from the joint posterior, at ``paths_time_s``; None for a method
     without one.  ``fits``: the polynomial method's orders and misfits.  By axis: ``peak_scales``, by what the spread of drawn
     peaks is multiplied, and ``evidence``, the fused method's data and levels.  ``gained``: the on-times method's steps.
-    ``impulses``: those asked for; ``compared``: other methods' results, drawn in the same figure."""
+    ``impulses``: those asked for; ``known``: torques of the surroundings that were taken off; ``compared``: other methods' results, drawn in the same figure."""
 
     RECORD: ClassVar[type] = TorqueRecord
     OLD_KEYS: ClassVar[dict[str, str]] = {
@@ -159,6 +170,7 @@ class TorqueResult(Estimate):
     evidence: dict[str, AxisData] = field(default_factory=dict)
     gained: Gained | None = None
     impulses: tuple[Impulse, ...] = ()
+    known: tuple[KnownTorque, ...] = ()
     compared: tuple[TorqueResult, ...] = ()
 
     # ---- over time ----
@@ -273,6 +285,11 @@ class TorqueResult(Estimate):
         impulses = [i.record() for i in self.impulses]
         if impulses:
             record["impulses"] = impulses
+        if self.known:
+            record["known"] = [
+                {"name": k.name, "source": k.source, "torque_Nm": self.column(k.torque_Nm), "torque_sigma_Nm": self.column(k.torque_sigma_Nm)}
+                for k in self.known
+            ]  # fmt: skip
         if self.fits:
             record["fits"] = list(self.fits)
         if self.relative:
@@ -345,8 +362,14 @@ class TorqueResult(Estimate):
                 width = [] if sigma is None else [f"{np.nanmedian(sigma[:, j]):.2g}"]
                 rows.append((AXES[j], f"{np.nanmean(t):+.3g}", f"{np.sqrt(np.nanmean(t**2)):.3g}", *width))
         head = ("axis", f"mean [{unit}]", "rms", *([] if sigma is None else ["1 sigma"]))
-        found = [Table(title, tuple(rows), head, tuple(map(self._impulse_text, self.impulses)))]
+        remarks = (*map(self._known_text, self.known), *map(self._impulse_text, self.impulses))
+        found = [Table(title, tuple(rows), head, remarks)]
         return (*found, *self._peak_table(factor, unit), *self._fit_table())
+
+    def _known_text(self, k: KnownTorque) -> str:
+        factor, unit = self._scaled()
+        rms, sigma = (factor * np.sqrt(np.mean(v[:, list(self.axes)] ** 2)) for v in (k.torque_Nm, k.torque_sigma_Nm))
+        return f"taken off: {k.name}, rms {plus_minus(rms, sigma, unit)} ({k.source})"
 
     def _impulse_text(self, i: Impulse) -> str:
         unit = "rad/s, per unit spin inertia" if self.relative else "N m s"

@@ -22,7 +22,7 @@ def sources_entry(result: SourcesResult, telemetry: Telemetry, craft: Craft, eve
 
     Raises BadInput for telemetry without an epoch."""
     values = tuple(
-        Value(f"{_FIGURES[name]}_{axis}", "telemetry", finite(v), finite(s), _unit(of.unit, result.relative))
+        Value(f"{_FIGURES[name]}_{axis}", "telemetry", finite(v), finite(s), _unit(result, of.unit))
         for name, of in result.found.items()
         for axis, v, s, told in zip(of.names, of.value, of.sigma, of.told, strict=True)
         if told
@@ -30,5 +30,5 @@ def sources_entry(result: SourcesResult, telemetry: Telemetry, craft: Craft, eve
     return record_entry(KIND, values, result.doubts, telemetry, craft, event_id, result.provenance)
 
 
-def _unit(unit: str, relative: bool) -> str:
-    return "rad/s^2, per unit spin inertia" if relative and unit == "N m" else unit
+def _unit(result: SourcesResult, unit: str) -> str:
+    return "rad/s^2, per unit spin inertia" if result.relative and unit == "N m" else unit
