@@ -8,7 +8,6 @@ import pytest
 from asflown.craft.model import Wheel
 from asflown.estimate.wheels import wheels
 from asflown.estimate.wheels.doubts import (
-    CURRENT_ZERO,
     FOLLOWS,
     FOUND_BY_SHAPE,
     MANY_COAST,
@@ -17,7 +16,9 @@ from asflown.estimate.wheels.doubts import (
     NONE_LISTED_HERE,
     TOO_MANY_NAMED,
     TORQUE_SCALE,
+    TORQUE_ZERO,
 )
+from asflown.estimate.wheels.motor import ZERO_SHARE
 from asflown.estimate.wheels.named import NamedRunDown, named_run_downs
 from asflown.kit.errors import BadInput
 from asflown.trends.entries.wheels import wheel_entry
@@ -90,9 +91,9 @@ def driven(seed, *, current=True, constant=0.05, J=0.02, coulomb=0.002, viscous=
     w[0] = 100.0
     for k in range(1, len(t)):
         w[k] = w[k - 1] + step / J * (torque[k - 1] - coulomb * np.sign(w[k - 1]) - viscous * w[k - 1])
-    t, w, torque = t[::every], w[::every], torque[::every]
+    t, w, torque = t[::every], w[::every], torque[::every] + bias
     w = w + 0.005 * rng.standard_normal(len(t))
-    channel = {"wheel_current_RWA1": (t, torque / constant + bias + 1e-3 * rng.standard_normal(len(t)))}
+    channel = {"wheel_current_RWA1": (t, torque / constant + 1e-3 * rng.standard_normal(len(t)))}
     return telemetry_of(wheel_rate_RWA1=(t, w), **(channel if current else {"wheel_torque_RWA1": (t, torque)}))
 
 
@@ -111,7 +112,8 @@ def one_wheel(J=0.02, constant=0.05):
 def test_recovery_pulls_of_motor_torque_are_unit_normal(current):
     pulls = []
     for seed in range(30):
-        f = wheels(driven(seed, current=current), one_wheel()).wheel("RWA1").fit
+        bias = ZERO_SHARE * 0.018 * np.random.default_rng(seed).standard_normal()  # N m, of the largest torque
+        f = wheels(driven(seed, current=current, bias=bias), one_wheel()).wheel("RWA1").fit
         assert f.basis == ("motor current" if current else "wheel command")
         total = 0.002 + 2e-5 * f.mean_rate_rad_s
         pulls.append(((f.coulomb_Nm - 0.002) / f.coulomb_sigma_Nm, (f.viscous_Nms - 2e-5) / f.viscous_sigma_Nms, (f.drag_at_mean_Nm - total) / f.drag_at_mean_sigma_Nm))  # fmt: skip
@@ -122,7 +124,7 @@ def test_a_wrong_torque_constant_is_doubted():
     result = wheels(driven(1), one_wheel(constant=0.06))
     assert result.doubts.about(wheel="RWA1").has(TORQUE_SCALE)
     assert not wheels(driven(1), one_wheel()).doubts.has(TORQUE_SCALE)
-    assert wheels(driven(1), one_wheel()).doubts.has(CURRENT_ZERO)
+    assert wheels(driven(1), one_wheel()).doubts.has(TORQUE_ZERO)
 
 
 def four(noise):

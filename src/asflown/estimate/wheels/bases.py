@@ -11,15 +11,15 @@ from .causes import motor_off
 from .doubts import (
     COMMAND_INCOMPLETE,
     COMMAND_SHOWS_NONE,
-    CURRENT_ZERO,
     FOLLOWS,
     FOUND_BY_SHAPE,
     MISFIT,
     NAMED_BUT_DRIVEN,
     PER_SPIN_INERTIA,
     TORQUE_SCALE,
+    TORQUE_ZERO,
 )
-from .motor import motor_law, steps_of
+from .motor import ZERO_SHARE, assumed_zero, motor_law, steps_of, zero_beforehand
 from .result import COMMAND, FLIGHT_SOFTWARE, MOTOR_CURRENT, WHEEL_COMMAND, DragFit, DragSamples, Spike
 from .run_downs import CURRENT, FEWEST, NAMED, SHAPE, STICTION_RATE, Coasting, common_law
 from .samples import find_spikes, opposing
@@ -35,6 +35,8 @@ _BLOCK_S, _FEWEST_BLOCKS = 60.0, 6
 _EDGE = 1e-3
 #: The motor's torque is off its scale by more than this share, and by this many sigma.
 _SCALE, _SCALE_SIGMAS = 0.05, 5.0
+#: A torque's zero that the record narrows by less than this is as assumed.
+_ZERO_UNTOLD = 0.9
 #: Drag below this many sigma is none.
 NONE = 3.0
 
@@ -111,8 +113,11 @@ def from_motor(
     J, fits, doubts = record.described(name).spin_inertia, [], []
     ways = ((MOTOR_CURRENT, record.motor_torque(name)), (WHEEL_COMMAND, record.commanded_of_wheel(name)))
     for basis, known in ways:
-        steps = None if known is None or J is None else steps_of(record.finders[name], *known, J, coasts)
-        law = None if steps is None else motor_law(steps)
+        if known is None or J is None:
+            continue
+        steps = steps_of(record.finders[name], *known, J, coasts)
+        zero = zero_beforehand(*known, coasts if basis == MOTOR_CURRENT else [])
+        law = None if steps is None else motor_law(steps, zero)
         if law is None:
             continue
         fit = DragFit.from_law(basis, law.values, law.covariance, law.rate)
@@ -123,8 +128,8 @@ def from_motor(
         fits.append(fit)
         if basis == WHEEL_COMMAND:
             doubts.append(COMMAND_INCOMPLETE(wheel=name))
-        elif not law.zero_fitted:
-            doubts.append(CURRENT_ZERO(wheel=name))
+        if law.zero[1] > _ZERO_UNTOLD * assumed_zero(known[1]):
+            doubts.append(TORQUE_ZERO(wheel=name, basis=basis, sigma_Nm=law.zero[1], share_percent=100 * ZERO_SHARE))
         if law.scale is not None and abs(law.scale[0] - 1) > max(_SCALE, _SCALE_SIGMAS * law.scale[1]):
             doubts.append(TORQUE_SCALE(wheel=name, basis=basis, scale=law.scale[0], scale_sigma=law.scale[1]))
     return fits, doubts

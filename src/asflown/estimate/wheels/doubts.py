@@ -52,15 +52,22 @@ TOO_MANY_NAMED = Kind(
 NONE_LISTED_HERE = Kind(
     "wheels.none-listed-here", Severity.NOTE, "none of the run-downs named lies in this telemetry: {wheels}"
 )
-CURRENT_ZERO = Kind(
-    "wheels.current-zero", Severity.CAUTION,
-    "wheel {wheel} turns mostly one way: an error in the zero of its motor's current appears as Coulomb drag and is not in the sigma",
-    "A run-down shows the drag without the current.",
+TORQUE_ZERO = Kind(
+    "wheels.torque-zero", Severity.NOTE,
+    "wheel {wheel}, {basis}: what the torque reads where there is none cannot be told from Coulomb drag while the wheel turns one "
+    "way; it is taken as 0 ± {sigma_Nm:.2g} N m ({share_percent:g} % of the largest torque, assumed), which the sigma holds",
+    "A run-down, or a wheel that turns both ways, shows it.",
 )  # fmt: skip
 TORQUE_SCALE = Kind(
     "wheels.torque-scale", Severity.SUSPECT,
     "wheel {wheel}, {basis}: the motor's torque is {scale:.3f} ± {scale_sigma:.3f} times what its spin inertia and rate need",
     "Check torque_constant and spin_inertia in the craft file, and the unit and sense of the channel.",
+)  # fmt: skip
+REVERSED = Kind(
+    "wheels.reversed", Severity.SUSPECT,
+    "the momenta of body and wheels balance only where the sense of wheel {wheels} is reversed (as described they miss by {ratio:.0f} "
+    "times as much): drag of a run-down does not depend on it, but torque and inertia do",
+    "Check the wheel's axis in the craft file, and the sign of its rate.",
 )  # fmt: skip
 FOUND_BY_SHAPE = Kind(
     "wheels.run-down-by-shape", Severity.NOTE,

@@ -2,10 +2,15 @@
 
 From sample to sample, with the way of turning s = sign(w):
 
-    s (integral of torque - J change of w) = coulomb dt + viscous (integral of |w|) + error
+    s (integral of torque - J change of w) = coulomb dt + viscous (integral of |w|) + s (zero dt + delay (change of torque)) + error
 
 What the motor does between samples of its torque makes errors that are independent from step to step; noise of the rate, and
 of a torque whose integral takes two samples, correlates neighbours.  Both are fitted, and the law by generalised least squares.
+
+zero is what the torque reads where there is none.  Of a wheel that turns one way it cannot be told from Coulomb drag: what is
+known of it beforehand, from coasts (where the motor is off, and the current reads its zero) or else assumed, is a prior.
+delay is how much later the torque acts than it is read, half a control cycle or so: it is nothing over a whole record, but without
+it the steps in which the torque jumps would be left out, and what the others are off with it.
 """
 
 from __future__ import annotations
@@ -31,10 +36,12 @@ _GAP = 3.5
 _FAR = 6.0
 #: Blocks of steps from which the scatter of the values is seen.
 _BLOCKS = 100
+#: Samples in a coast from which the torque's zero is seen, at least, and blocks of them that show its error.
+_FEWEST_OFF, _BLOCKS_OFF = 24, 8
 #: Blocks that compare the torque with the momentum gained, and by how many times the errors they must move.
 _SCALE_BLOCKS, _MOVED = 40, 5.0
-#: Share of the steps in which a wheel turns the other way, from which the torque's zero is fitted too.
-_BOTH_WAYS = 0.2
+#: One sigma of the torque's zero beforehand, as a share of the largest torque seen: assumed, as of a sensor of the 1 % class.
+ZERO_SHARE = 0.01
 
 
 @dataclass(frozen=True)
@@ -42,13 +49,14 @@ class Steps:
     """Steps of a wheel in which it turns one way, clear of stiction, and its motor's torque is known; all (N,).
 
     ``way``: sign of the rate; ``turned``: integral of |rate|; ``lost``: torque's integral less momentum gained, in the way of
-    turning; ``gained``: momentum gained, in the way of turning; ``joined``: whether the next step begins where this one ends."""
+    turning; ``gained``: momentum gained, in the way of turning; ``jump``: change of the torque, in the way of turning; ``joined``: whether the next step begins where this one ends."""
 
     dt: np.ndarray
     way: np.ndarray
     turned: np.ndarray
     lost: np.ndarray
     gained: np.ndarray
+    jump: np.ndarray
     joined: np.ndarray
 
 
@@ -56,14 +64,33 @@ class Steps:
 class MotorLaw:
     """Coulomb [N m] and viscous drag [N m s], their covariance, and the mean |rate| of the samples used [rad/s].
 
-    ``zero_fitted``: whether the torque's zero is told apart, since the wheel turns both ways; ``scale``: torque's integral over
-    momentum gained and its sigma, None where the wheel's rate changes too little."""
+    ``zero``: of the torque and its sigma [N m], which the covariance holds; ``scale``: torque's integral over momentum gained
+    and its sigma, None where the wheel's rate changes too little."""
 
     values: np.ndarray
     covariance: np.ndarray
     rate: float
-    zero_fitted: bool
+    zero: tuple[float, float]
     scale: tuple[float, float] | None
+
+
+def assumed_zero(torque) -> float:
+    """One sigma of the zero of a motor's torque of which nothing is known. [N m]"""
+    return max(ZERO_SHARE * float(np.quantile(np.abs(torque), 0.999)), 1e-12) if len(torque) else 1e-12
+
+
+def zero_beforehand(t, torque, coasts: list[tuple[float, float]]) -> tuple[float, float]:
+    """Zero of a motor's torque and its sigma [N m], before the law is fitted.
+
+    ``coasts``: spans [s] in which the motor is off, none where the torque is a command."""
+    means, weights = [0.0], [assumed_zero(torque) ** -2]
+    for start, stop in coasts:
+        inside = torque[(t > start) & (t < stop)]
+        if len(inside) >= _FEWEST_OFF:
+            blocks = np.array([float(np.mean(b)) for b in np.array_split(inside, _BLOCKS_OFF)])
+            means.append(float(np.mean(inside)))
+            weights.append(_BLOCKS_OFF / max(float(np.var(blocks, ddof=1)), 1e-24))
+    return float(np.average(means, weights=weights)), float(1 / np.sqrt(np.sum(weights)))
 
 
 def steps_of(finder: Finder, t, torque, J: float, coasts: list[tuple[float, float]]) -> Steps | None:
@@ -92,10 +119,11 @@ def steps_of(finder: Finder, t, torque, J: float, coasts: list[tuple[float, floa
         integral = np.interp(b, t, whole) - np.interp(a, t, whole)
         turned = np.interp(b, finder.t[s], _turned(finder, s)) - np.interp(a, finder.t[s], _turned(finder, s))
         joined = np.append(np.diff(k) == 1, False)[: len(k)]
-        parts.append((b - a, way, turned, way * (integral - gained), way * gained, joined, k))
+        jump = np.interp(b, t, torque) - np.interp(a, t, torque)
+        parts.append([x[k] for x in (b - a, way, turned, way * (integral - gained), way * gained, way * jump)] + [joined])
     if not parts:
         return None
-    columns = [np.concatenate([p[c] if c == 5 else p[c][p[6]] for p in parts]) for c in range(6)]
+    columns = [np.concatenate(c) for c in zip(*parts, strict=True)]
     return Steps(*columns) if len(columns[0]) >= _FEWEST else None
 
 
@@ -105,32 +133,40 @@ def _turned(finder: Finder, s: slice) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(0.5 * np.diff(t) * (u[1:] + u[:-1]))])
 
 
-def motor_law(steps: Steps) -> MotorLaw | None:
-    """The law of drag; None where the steps do not tell it."""
-    columns = [steps.dt, steps.turned]
-    back = float(np.sum(steps.dt[steps.way < 0]) / np.sum(steps.dt))
-    zero_fitted = min(back, 1 - back) >= _BOTH_WAYS
-    if zero_fitted:
-        columns.append(steps.way * steps.dt)
-    X = np.column_stack(columns)
+def motor_law(steps: Steps, zero: tuple[float, float]) -> MotorLaw | None:
+    """The law of drag; None where the steps do not tell it.  ``zero``: of the torque and its sigma, known beforehand [N m]."""
+    X = np.column_stack([steps.dt, steps.turned, steps.way * steps.dt, steps.jump])
     size = np.linalg.norm(X, axis=0)
+    if size[3] == 0:  # a torque that never changes has no delay
+        X, size = X[:, :3], size[:3]
     kept = np.ones(len(X), bool)
     for _ in range(4):
-        x, A, errors = _generalised(X / size, steps, kept)
+        A, y, errors = _generalised(X / size, steps, kept)
         sigma = robust_sigma(errors[kept])
         again = np.abs(errors) <= _FAR * sigma if sigma > 0 else kept
         if np.array_equal(again, kept) or again.sum() < _FEWEST:
             break
         kept = again
-    covariance = _covariance(A[kept], errors[kept]) / np.outer(size, size)
-    if not (np.isfinite(covariance).all() and np.isfinite(x).all()):
+    variance = _variance(A[kept, :2], errors[kept])
+    information = A[kept].T @ A[kept] / variance
+    told = A[kept].T @ y[kept] / variance
+    own = (zero[1] * size[2]) ** -2
+    information[2, 2] += own
+    told[2] += own * zero[0] * size[2]
+    try:
+        covariance = np.linalg.inv(information)
+    except np.linalg.LinAlgError:
+        return None
+    x, covariance = covariance @ told / size, covariance / np.outer(size, size)
+    if not (np.isfinite(covariance).all() and np.isfinite(x).all() and np.all(np.diag(covariance) > 0)):
         return None
     rate = float(np.sum(steps.turned[kept]) / np.sum(steps.dt[kept]))
-    return MotorLaw((x / size)[:2], covariance[:2, :2], rate, zero_fitted, _scale(steps, kept))
+    found = (float(x[2]), float(np.sqrt(covariance[2, 2])))
+    return MotorLaw(x[:2], covariance[:2, :2], rate, found, _scale(steps, kept))
 
 
 def _generalised(X, steps: Steps, kept):
-    """Values, whitened columns and whitened errors, at the correlation that is likeliest."""
+    """Whitened columns, values and errors, at the correlation that is likeliest."""
 
     def whitened(u: float):
         share = np.tan(0.5 * np.pi * u)  # of the correlated part, either sign
@@ -143,24 +179,23 @@ def _generalised(X, steps: Steps, kept):
         x, *_ = np.linalg.lstsq(A, y, rcond=None)
         errors = y - A @ x
         loss = len(y) * np.log(max(float(errors @ errors), 1e-300)) + 2 * float(np.sum(np.log(factor[0])))
-        return loss, x, A, errors
+        return loss, A, y, errors
 
     tried = np.linspace(-0.99, 0.99, 23)
     best = float(tried[int(np.argmin([whitened(u)[0] for u in tried]))])
     near = minimize_scalar(lambda u: whitened(u)[0], bounds=(max(best - 0.09, -0.999), min(best + 0.09, 0.999)), method="bounded")  # fmt: skip
-    _, x, A, errors = whitened(float(near.x))
-    return x, A, errors
+    return whitened(float(near.x))[1:]
 
 
-def _covariance(A, errors) -> np.ndarray:
-    """Of the values: as for even and independent errors, widened where those of blocks of steps show more.
+def _variance(A, errors) -> float:
+    """Of a whitened error: as of even and independent ones, widened where blocks of steps show more.
 
     A motor works harder at some times than at others, and what it does between samples may last."""
     inverse = np.linalg.pinv(A.T @ A)
-    plain = float(errors @ errors) / max(len(errors) - A.shape[1], 1) * inverse
+    variance = float(errors @ errors) / max(len(errors) - A.shape[1], 1)
     scores = np.array([A[b].T @ errors[b] for b in np.array_split(np.arange(len(errors)), _BLOCKS)])
     seen = inverse @ (scores.T @ scores) @ inverse * _BLOCKS / (_BLOCKS - A.shape[1])
-    return plain * max(1.0, float(np.max(np.diag(seen) / np.diag(plain))))
+    return variance * max(1.0, float(np.max(np.diag(seen) / np.diag(variance * inverse))))
 
 
 def _scale(steps: Steps, kept) -> tuple[float, float] | None:

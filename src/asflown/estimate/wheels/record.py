@@ -12,7 +12,7 @@ from ...kit.errors import BadInput, some_of
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
 from .named import check_named, named_run_downs, spans_of
-from .run_downs import Finder
+from .run_downs import FEWEST, Finder, own_noise
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 #: Condition number of three wheels' axes beyond which their shares of a torque are not told.
 _ALIGNED = 1e3
+#: Body rates are put to a wheel's where they change by so many times their noise, and reach its ends to so many seconds.
+_MOVES, _ENDS_S = 2.0, 10.0
 
 
 @dataclass(frozen=True)
@@ -119,5 +121,24 @@ def record_of(telemetry: Telemetry, craft: Craft, run_down: Collection[str | Nam
                 remedy=f"Wheels with a rate here: {some_of(names)}.",
             )
     channels = {n: telemetry.channel(f"wheel_rate_{n}") for n in names}
-    finders = {n: Finder(c, telemetry.seconds(c.usable.tai_ns)) for n, c in channels.items()}
-    return RecordedWheels(telemetry, craft, craft.at(telemetry.date_ns), finders, spans, named)
+    now = craft.at(telemetry.date_ns)
+    finders = {}
+    for n, c in channels.items():
+        seconds = telemetry.seconds(c.usable.tai_ns)
+        axis = (now.wheel(n) or [w for w in craft.wheels if w.name == n][-1]).axis
+        finders[n] = Finder(c, seconds, _turning_along(telemetry, axis, seconds))
+    return RecordedWheels(telemetry, craft, now, finders, spans, named)
+
+
+def _turning_along(telemetry: Telemetry, axis, seconds: np.ndarray) -> np.ndarray | None:
+    """The body's rate along an axis at a wheel's samples (N,) [rad/s]; None where it is not known or does not matter."""
+    if not telemetry.has_axes("body_rate") or len(seconds) < FEWEST:
+        return None
+    along = np.zeros(len(seconds))
+    for a, share in zip(AXES, axis, strict=True):
+        c = telemetry.channel(f"body_rate_{a}").usable
+        t = telemetry.seconds(c.tai_ns)
+        if not len(t) or t[0] > seconds[0] + _ENDS_S or t[-1] < seconds[-1] - _ENDS_S:
+            return None
+        along += share * np.interp(seconds, t, c.values)
+    return along if float(np.std(along)) > _MOVES * own_noise(along, seconds) else None

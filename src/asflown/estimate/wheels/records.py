@@ -11,7 +11,6 @@ import numpy as np
 from ...kit.doubts import Doubts
 from ...kit.errors import BadInput, some_of
 from .named import NamedRunDown, check_named, named_run_downs
-from .result import WheelsResult
 from .study import LOW_SPEED, wheels
 from .use import WheelUse
 
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
     from ...craft.model import Craft
     from ...telemetry.telemetry import Telemetry
-    from .result import WheelDrag
+    from .result import WheelDrag, WheelsResult
     from .run_downs import RunDown
 
 
@@ -36,7 +35,7 @@ def wheels_of_records(
     *,
     low_speed_rad_s: float = LOW_SPEED,
     run_down: Collection[str | NamedRunDown] = (),
-    each: Callable[[WheelsResult, Telemetry], None] = lambda result, telemetry: None,
+    each: Callable[[WheelsResult, Telemetry], None] | None = None,
 ) -> WheelsResult:
     """What ``wheels`` finds in each of several records, as one result.
 
@@ -50,7 +49,7 @@ def wheels_of_records(
         Below it a wheel dwells [rad/s].
     run_down : collection of str or NamedRunDown
         As of ``wheels``.  All must lie in the records; in several records their times are UTC.
-    each : callable
+    each : callable, optional
         Is told the result of every record, with its telemetry, once that is done.
 
     Returns
@@ -73,7 +72,8 @@ def wheels_of_records(
             _check_several(telemetry, named)
         here = [n for n in named if _lies_in(n, telemetry)]
         result = wheels(telemetry, craft, low_speed_rad_s=low_speed_rad_s, run_down=here)
-        each(result, telemetry)
+        if each is not None:
+            each(result, telemetry)
         found.update(here)
         seen.append(_Seen(telemetry.epoch_ns, Path(telemetry.source).name, result))
     for n in named:

@@ -4,8 +4,10 @@
     u(s) = u_m exp(-b s) - a s phi(b s),   phi(x) = (1 - exp(-x)) / x
 
 The law itself is fitted to the samples: nothing is differenced.  The wheel turns against the body, so the left side
-is J (du/dt + a.dw/dt): what the body's rate changes by is left out.  In a hold that is below 1e-4 rad/s, against
-5e-3 rad/s of a tachometer's noise; a slew of 4 mrad/s would just reach that noise.
+is J (du/dt + a.dw/dt).  Where the body's rate along the axis is known, d = a.w, the rate u + d - q obeys the law, with
+dq/dt = b (d - q): what the bearing does to the part that is the body's.  In a hold that is below 1e-4 rad/s, against
+5e-3 rad/s of a tachometer's noise; a slew of 4 mrad/s would just reach that noise.  Turning of the momentum (w x h) loads
+the bearings across the spin axis and does not slow the wheel.
 """
 
 from __future__ import annotations
@@ -205,12 +207,28 @@ def own_noise(values: np.ndarray, seconds: np.ndarray) -> float:
     return float(robust_sigma(off / np.sqrt(1 + share**2 + (1 - share) ** 2)))
 
 
-class Finder:
-    """Looks for run-downs in one wheel's samples: stretches that slow as a bearing alone would slow it."""
+def followed(t: np.ndarray, turning: np.ndarray, per_s: float) -> np.ndarray:
+    """q with dq/dt = per_s (turning - q), which begins at the first value; turning is straight from sample to sample. (N,)"""
+    q = np.empty_like(turning)
+    q[0] = turning[0]
+    dt = np.diff(t)
+    keep, mean = np.exp(-per_s * dt), phi(per_s * dt)[0]
+    for k in range(len(dt)):
+        rise = turning[k + 1] - turning[k]
+        q[k + 1] = keep[k] * q[k] + (1 - keep[k]) * turning[k] + (1 - mean[k]) * rise
+    return q
 
-    def __init__(self, channel: Channel, seconds: np.ndarray):
+
+class Finder:
+    """Looks for run-downs in one wheel's samples: stretches that slow as a bearing alone would slow it.
+
+    ``turning``: the body's rate along the wheel's axis at the samples (N,) [rad/s], None where it is not known or does not matter;
+    ``rate``: the wheel's with it."""
+
+    def __init__(self, channel: Channel, seconds: np.ndarray, turning: np.ndarray | None = None):
         c = channel.usable
-        self.t, self.rate = seconds, c.values
+        self.t, self.turning = seconds, turning
+        self.rate = c.values if turning is None else c.values + turning
         self.quantum = channel.count_size or quantisation_step(c.values)
         self.gapless = c.segments()
         self.fitted = lru_cache(maxsize=None)(self._fitted)
@@ -223,13 +241,19 @@ class Finder:
                 found += [slice(s.start + r.start, s.start + r.stop) for r in runs(way * self.rate[s] > STICTION_RATE)]
         return sorted((s for s in found if s.stop - s.start >= FEWEST), key=lambda s: s.start)
 
-    def span(self, a: int, b: int) -> Span:
-        t = self.t[a:b]
-        return Span(t - 0.5 * (t[0] + t[-1]), np.abs(self.rate[a:b]), self.quantum)
+    def span(self, a: int, b: int, viscous_per_s: float = 0.0) -> Span:
+        """Samples a..b.  ``viscous_per_s``: viscous drag per spin inertia, by which the body's part of the rate decays."""
+        t, u = self.t[a:b], np.abs(self.rate[a:b])
+        if self.turning is not None and viscous_per_s > 0:
+            u = u - np.sign(self.rate[a]) * followed(t, self.turning[a:b], viscous_per_s)
+        return Span(t - 0.5 * (t[0] + t[-1]), u, self.quantum)
 
     def _fitted(self, a: int, b: int):
         p = self.span(a, b)
         x, inverse, (r,) = fit_coasts([p])
+        if self.turning is not None:
+            p = self.span(a, b, float(x[1]))
+            x, inverse, (r,) = fit_coasts([p])
         return p, x, inverse, r, own_noise(p.u, p.s)
 
     def obeys(self, a: int, b: int) -> bool:
@@ -321,6 +345,9 @@ def common_law(finder: Finder, spans: list[tuple[int, int]], found_by: str) -> C
 def _law(finder: Finder, spans: list[tuple[int, int]]) -> tuple[Law, list[np.ndarray], list[np.ndarray]]:
     """The law of some spans together; of each which samples are used, and |rate| by the law."""
     parts = [finder.span(a, b) for a, b in spans]
+    if finder.turning is not None:
+        viscous_per_s = float(fit_coasts(parts)[0][1])
+        parts = [finder.span(a, b, viscous_per_s) for a, b in spans]
     keep = [np.ones(len(p.s), bool) for p in parts]
     for _ in range(5):
         used = [replace(p, s=p.s[k], u=p.u[k]) for p, k in zip(parts, keep, strict=True)]

@@ -31,6 +31,7 @@ from .record import RecordedWheels, record_of
 from .result import DragFit, WheelDrag, WheelsResult
 from .rivals import HOLDING
 from .run_downs import FEWEST, STICTION_RATE, Coasting
+from .senses import reversed_wheels
 from .use import wheel_use
 
 if TYPE_CHECKING:
@@ -84,7 +85,7 @@ def wheels(
         raise BadInput(f"the low speed {low_speed_rad_s:g} rad/s is not positive", remedy='Give it as in "300 rpm".')
     record = record_of(telemetry, craft, run_down)
     seen, followers = slowings(record)
-    coastings, doubts = {}, [*telemetry.doubts, *_of_named(record, run_down), *followers]
+    coastings, doubts = {}, [*telemetry.doubts, *_of_named(record, run_down), *reversed_wheels(record), *followers]
     for name in record.finders:
         coastings[name], found = coasting_of(record, name, seen[name])
         doubts += found

@@ -75,7 +75,7 @@ def run_down_entries(
     BadInput
         For telemetry without an epoch.
     """
-    found = []
+    found, provenance = [], result.provenance
     for w in result.wheels:
         for r in w.run_downs:
             if r.is_guessed and not guesses:
@@ -83,7 +83,7 @@ def run_down_entries(
             date = utc_label(telemetry.epoch_ns + round(r.start_s * NS))
             name = f"{event_id or KIND}-{w.name}-{date}"
             doubts = Doubts(_about(result.doubts, w, r))
-            entry = record_entry(KIND, tuple(_drag(w, w.alone(r))), doubts, telemetry, craft, name, result.provenance)
+            entry = record_entry(KIND, tuple(_drag(w, w.alone(r))), doubts, telemetry, craft, name, provenance)
             found.append(replace(entry, date=date))
     return sorted(found, key=lambda e: e.day)
 
