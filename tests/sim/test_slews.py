@@ -65,7 +65,7 @@ def hung(size: float, times) -> np.ndarray:
     x, work = np.r_[1.0, np.zeros(14)], np.empty((5, 15))
     states = [x.copy()]
     for t, step in zip(times, np.diff(times), strict=False):
-        advance(t, x, empty, size * PUSH if t < 4.999 else np.zeros(3), plant, step / 8, 8, work)
+        advance(t, x, empty, size * PUSH if t < 4.999 else np.zeros(3), np.zeros(3), plant, step / 8, 8, work)
         states.append(x.copy())
     return np.array(states)
 

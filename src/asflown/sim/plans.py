@@ -58,6 +58,8 @@ class Plan(Part):
 
     @classmethod
     def _checked(cls, written: dict, where: str, folder: Path) -> Self:
+        # TOML has dates of its own; here they are text, as the record keeps them
+        written = {k: v.isoformat() if hasattr(v, "isoformat") else v for k, v in written.items()}
         plan = validated(cls, written, where, cls.REMEDY)
         plan._written, plan._folder = written, folder
         return plan

@@ -46,7 +46,9 @@ def orbital_readings(scenario: Scenario, truth: Truth, here: Along, field_error:
 
 
 def motor_readings(scenario: Scenario, truth: Truth, now: CraftAt) -> dict[str, np.ndarray]:
-    """Ordered torque of each motor, and its current where the craft's file says what torque an ampere gives."""
+    """Ordered torque of each motor, and its current where the craft's file says what torque an ampere gives.
+
+    A current is read across the instant at which it changes: the mean of the cycles before and after."""
     names = [w.name for w in now.wheels]
     readings = axes_of("wheel_torque", truth.motor_torque_Nm, names)
     constants = [w.torque_constant for w in now.wheels]
@@ -57,4 +59,6 @@ def motor_readings(scenario: Scenario, truth: Truth, now: CraftAt) -> dict[str, 
     noise = normal(
         scenario.seed, "motor current", truth.motor_torque_Nm.shape, FACTOR[scenario.noise] * s.wheel_current
     )
-    return readings | axes_of("wheel_current", truth.motor_torque_Nm / np.array(constants, float) + zero + noise, names)
+    held = truth.motor_torque_Nm
+    across = np.vstack([held[:1], (held[:-1] + held[1:]) / 2])
+    return readings | axes_of("wheel_current", across / np.array(constants, float) + zero + noise, names)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...kit.errors import BadInput
+
 if TYPE_CHECKING:
     from ..scenario import Scenario
 
@@ -73,8 +75,15 @@ class Estimator:
 
         One reading to the next the error goes as x' = (1 - k)(x + g) + k v, with g the gyro's random
         walk in between: k = 1 - exp(-T / time) sets the correlation, and the variance
-        s^2 (1 - (1 - k)^2) = k^2 var(v) + (1 - k)^2 var(g) the star tracker's noise v."""
+        s^2 (1 - (1 - k)^2) = k^2 var(v) + (1 - k)^2 var(g) the star tracker's noise v.  Raises BadInput where the gyro alone
+        makes a larger error."""
         keep = np.exp(-STAR_TRACKER_PERIOD_S / noise.attitude_time_s)
         walk = noise.gyro_rad_s**2 * period_s * STAR_TRACKER_PERIOD_S
         variance = noise.attitude_coloured_rad**2 * (1 - keep**2) - keep**2 * walk
-        return cls(float(1 - keep), float(np.sqrt(max(variance, 0.0)) / (1 - keep)))
+        if variance < 0:
+            least = np.sqrt(keep**2 * walk / (1 - keep**2))
+            raise BadInput(
+                f"the gyro's noise alone makes an attitude error of {1e6 * least:.3g} urad, more than attitude_coloured",
+                remedy="Raise attitude_coloured under [sensors], or lower attitude_time or gyro.",
+            )
+        return cls(float(1 - keep), float(np.sqrt(variance) / (1 - keep)))

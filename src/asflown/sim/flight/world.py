@@ -17,7 +17,7 @@ from ...dynamics.thermosphere import density_at, exponential_density
 from ...kit.errors import BadInput
 from ...kit.timeline import NS
 from ..tables import read_table
-from .plant import CURVES, LIT, World
+from .plant import AIR, LIT, World
 
 if TYPE_CHECKING:
     from ...craft.model import CraftAt
@@ -48,6 +48,7 @@ class Along:
     lit: np.ndarray  # (k,), share of the Sun's disc that is seen
     density_kgm3: np.ndarray  # (k,)
     epoch_tai_s: float
+    mean_density_kgm3: float  # over the flight, the swing of day and night aside
 
     @cached_property
     def place(self) -> CubicSpline:
@@ -76,8 +77,8 @@ class Along:
         u = (time_s - self.time_s[k])[:, None]
         a, b, c, d = self.curves[:, k]
         row = ((a * u + b) * u + c) * u + d
-        return Along(time_s, row[:, :3], row[:, 3:6], row[:, 6:9], row[:, 9:12], row[:, 12:15], row[:, LIT], row[:, CURVES - 1],
-                     self.epoch_tai_s)  # fmt: skip
+        return Along(time_s, row[:, :3], row[:, 3:6], row[:, 6:9], row[:, 9:12], row[:, 12:15], row[:, LIT], row[:, AIR],
+                     self.epoch_tai_s, self.mean_density_kgm3)  # fmt: skip
 
     def shadows(self, start_s: float, stop_s: float) -> list[dict]:
         """Every passage through the shadow between two instants: begin and end of penumbra and umbra; null outside the span. [s]"""
@@ -109,11 +110,15 @@ def along_orbit(scenario: Scenario, now: CraftAt, start_s: float, stop_s: float,
     check_above_earth(r)
     sun = sun_direction(tai_s)
     environment = scenario.environment
-    air = np.zeros(len(t)) if environment is None else _density(environment, now, r, v, t, tai_s)
+    air, swing = np.zeros(len(t)), np.ones(len(t))
+    if environment is not None:
+        air, swing = _density(scenario, environment, now, r, v, t, tai_s)
     wind = v
     if environment is not None and environment.corotation:
         wind = v - np.cross([0.0, 0.0, EARTH_RATE], r)
-    return Along(t, r, v, wind, field_at(r, tai_s), sun, sunlit(r, sun), air, scenario.epoch_ns / NS)
+    during = (t >= 0) & (t <= scenario.duration)
+    mean = float((air / swing)[during].mean())
+    return Along(t, r, v, wind, field_at(r, tai_s), sun, sunlit(r, sun), air, scenario.epoch_ns / NS, mean)
 
 
 def world_of(scenario: Scenario, now: CraftAt, along: Along | None) -> World:
@@ -221,17 +226,19 @@ def _path(scenario: Scenario, now: CraftAt, t: np.ndarray) -> tuple[np.ndarray, 
     return curve(t), curve(t, 1)
 
 
-def _density(e: Environment, now: CraftAt, r, v, t, tai_s) -> np.ndarray:
+def _density(scenario: Scenario, e: Environment, now: CraftAt, r, v, t, tai_s) -> tuple[np.ndarray, np.ndarray]:
+    """Density at every knot, and its swing of day and night, which is in it: (k,) each."""
     if e.air == "msis":
         rho = density_at(r, tai_s, e.f107, e.f107_mean, e.ap)
     else:
-        height = np.linalg.norm(r, axis=1) - EARTH_RADIUS_M
-        base = float(np.interp(0.0, t, height)) if e.reference_height is None else e.reference_height
-        rho = exponential_density(height, reference_density(e, now), base, e.scale_height)
+        height, reference = np.linalg.norm(r, axis=1) - EARTH_RADIUS_M, reference_density(e, now)
+        rho = exponential_density(height, reference, e.reference_height or 0.0, e.scale_height)
+        if e.reference_height is None:
+            rho *= reference / rho[(t >= 0) & (t <= scenario.duration)].mean()
     # the mean motion of the orbit through the first place: vis viva
     a = 1 / (2 / np.linalg.norm(r[0]) - v[0] @ v[0] / MU_EARTH)
     swing = 1 + e.density_swing * np.cos(np.sqrt(MU_EARTH / a**3) * t + e.density_phase)
-    return e.density_factor * swing * rho
+    return e.density_factor * swing * rho, swing
 
 
 def _refuse_undescribed(now: CraftAt, what: str, table: str, key: str) -> NoReturn:

@@ -141,11 +141,15 @@ def _environment_of(flight) -> dict | None:
         return record
     now = flight.craft.at(flight.scenario.epoch_ns)
     (sun, lit), (air, flown_through) = acting_sunlight(e, now), acting_drag(e, now)
-    vectors = {"dipole_Am2": acting_dipole(e, now), "sunlight_lever_Nm": sun, "drag_lever_Nm": air}
+    reference, mean = reference_density(e, now), truth.along.mean_density_kgm3
+    vectors = {
+        "dipole_Am2": acting_dipole(e, now), "sunlight_lever_Nm": sun, "drag_lever_Nm": air,
+        "drag_lever_at_mean_density_Nm": None if air is None else air * mean / reference,
+    }  # fmt: skip
     return record | {name: None if v is None else v.tolist() for name, v in vectors.items()} | {
         "sunlit_facets": len(lit), "air_facets": len(flown_through),
-        "reference_density_kgm3": reference_density(e, now), "density_factor": e.density_factor,
+        "reference_density_kgm3": reference, "mean_density_kgm3": mean, "density_factor": e.density_factor,
         "density_swing": e.density_swing, "density_phase_rad": e.density_phase,
         "meaning": "torque = gravity gradient + lit (sunlight_lever x s) + dipole x B + density / reference_density (drag_lever x -v/|v|)"
-        " + rods x B, body axes, s and v/|v| of length one; sunlit, air_density and each source's torque stand in truth.csv",
+        " + rods x B, body axes, s and v/|v| of length one; the mean density is the flight's without its swing; sunlit, air_density and each source's torque stand in truth.csv",
     }  # fmt: skip

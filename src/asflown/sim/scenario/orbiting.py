@@ -47,7 +47,7 @@ class Environment(Part):
     drag_lever: TorqueVector | None = None  # type: ignore[valid-type]  # at the reference density
     air: Literal["exponential", "msis"] = "exponential"
     reference_density: _in("kg/m3") | None = Field(default=None, gt=0)  # type: ignore[valid-type]  # the craft's
-    reference_height: Metre | None = None  # where the exponential air has it; the orbit's own at the epoch
+    reference_height: Metre | None = None  # where the exponential air has it; in the mean over the flight
     scale_height: Metre = Field(default=60e3, gt=0)
     f107: float = Field(default=150.0, gt=0)
     f107_mean: float = Field(default=150.0, gt=0)
