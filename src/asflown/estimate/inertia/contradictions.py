@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
+from ...dynamics.rigid_body import tensor_of
 from ...kit.doubts import Doubts, Kind, Severity
 from ...kit.errors import BadInput
 from ...kit.regression import memory
@@ -48,11 +49,21 @@ def conserved(record: SlewRecord, slews: list[Slew], source: str | None) -> Slew
     Raises BadInput, naming the likeliest mistake, where another reading of the data conserves it far better.  Tried: the
     quaternion in the other direction, rates in another unit where no attitude shows it, one wheel turning the other
     way, two wheels mistaken for each other, in all of the record or after one of its slews."""
-    left = plain_fit(record)[1]
+    beta, left = plain_fit(record)
+    if slews and np.all(np.diag(tensor_of(beta[Layout.TENSOR])) < 0):
+        raise BadInput(
+            "the wheels turn with the body and not against it, as if its inertia were negative: momentum would be conserved if all of "
+            "them turned the other way",
+            file=source,
+            remedy="Reverse the wheels' axes in the craft file, or the sense of their rates.",
+        )
     limit = _TOO_MUCH**2 * _variance(record) * len(record.momentum.time_s)
     if left <= limit:
         return record
-    tried = {what: plain_fit(other)[1] for what, other in _others(record, slews)}
+    # in orbit outside torques are at work beside the mistake, and would hide how much mending it helps
+    left_of = left_of_slow if record.orbit is not None else lambda r: plain_fit(r)[1]
+    left = left_of(record)
+    tried = {what: left_of(other) for what, other in _others(record, slews)}
     best = min(tried, key=lambda w: tried[w], default=None)
     if best is not None and tried[best] * _MENDED**2 < left:
         raise BadInput(
@@ -61,7 +72,7 @@ def conserved(record: SlewRecord, slews: list[Slew], source: str | None) -> Slew
             remedy="Correct the column names and units, the craft's wheel axes or the quaternion's direction, or leave the span out "
             "(--start, --stop).",
         )
-    if record.orbit is not None and left_of_slow(record) <= limit:
+    if record.orbit is not None and left <= limit:
         return replace(record, slow=True)
     parted = record
     for _ in range(MOST_STEPS):
@@ -122,7 +133,8 @@ def _others(record: SlewRecord, slews: list[Slew]) -> Iterator[tuple[str, SlewRe
         for factor, unit in MISTAKEN_UNITS.items():
             rates = replace(record.rates, value_rad_s=record.rates.value_rad_s / factor)
             yield f"the body rates were {unit}", replace(record, rates=rates)
-    if len(record.axes) != 3 or abs(np.linalg.det(record.axes)) < 1e-9 * np.abs(record.axes).max() ** 3:
+    n = len(record.axes)
+    if record.spins is None and (n != 3 or abs(np.linalg.det(record.axes)) < 1e-9 * np.abs(record.axes).max() ** 3):
         return
     times = [None, *[0.5 * (a.stop_s + b.start_s) for a, b in pairwise(slews)]]
     for after in times:
@@ -131,7 +143,7 @@ def _others(record: SlewRecord, slews: list[Slew]) -> Iterator[tuple[str, SlewRe
             flipped = record.axes.copy()
             flipped[k] *= -1
             yield f"wheel {name} turned the other way{when}", _read_as(record, flipped, after)
-        for i, j in combinations(range(3), 2):
+        for i, j in combinations(range(n), 2):
             swapped = record.axes.copy()
             swapped[[i, j]] = swapped[[j, i]]
             what = f"wheels {record.wheels[i]} and {record.wheels[j]} were mistaken for each other{when}"
@@ -139,10 +151,16 @@ def _others(record: SlewRecord, slews: list[Slew]) -> Iterator[tuple[str, SlewRe
 
 
 def _read_as(record: SlewRecord, axes: np.ndarray, after: float | None) -> SlewRecord:
-    """The same readings, the wheels' momentum along other axes (3, 3)."""
+    """The same readings, the wheels' momentum along other axes (n, 3)."""
     m = record.momentum
     _, h, index = m.vectors(m.value_Nms)
-    other = h @ np.linalg.inv(record.axes) @ axes
+    if record.spins is None:
+        change = h @ np.linalg.inv(record.axes) @ axes - h
+        other = np.sum(m.direction * change[index], axis=1)
+    else:
+        at, readings = record.spins
+        change = readings @ (axes - record.axes)
+        other = np.sum(m.direction * change[np.searchsorted(at, m.time_s)], axis=1)
     late = np.ones(len(index), bool) if after is None else m.time_s > after
-    value = np.where(late, np.sum(m.direction * other[index], axis=1), m.value_Nms)
+    value = m.value_Nms + np.where(late, other, 0.0)
     return replace(record, momentum=replace(m, value_Nms=value))

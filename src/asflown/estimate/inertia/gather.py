@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput, some_of
-from ...kit.rotations import quaternion, rotation
+from ...kit.rotations import quaternion, rates_between, rotation
 from ...kit.scatter import difference_sigma
 from ...kit.timeline import NS
 from ...telemetry.attitude import rate_scale, together
@@ -37,6 +37,8 @@ _BEFORE_S, _AFTER_S = 1.0, 4.0
 #: A wheel that begins to report later, or stops earlier, than others by this much was switched. [s]
 _SWITCHED_S = 60.0
 _FEWEST = 20
+#: Axes of gyros and quaternion apart by more than this [rad], and by so many sigmas, are spoken of; means over so many blocks.
+_TILT, _TILT_SIGMAS, _TILT_BLOCKS = np.radians(0.2), 6.0, 120
 _QUATERNION = [f"quaternion_{m}" for m in "wxyz"]
 
 NO_ATTITUDE = Kind(
@@ -65,10 +67,17 @@ WHEELS_APART = Kind(
     "inertia.wheels-apart", Severity.NOTE,
     "the wheels are read at different instants: each reading is used at its own time",
 )  # fmt: skip
+TILTED = Kind(
+    "inertia.axes-tilted", Severity.SUSPECT,
+    "the quaternion's body axes are turned by {angle_deg:.2g} deg against those of the body rates ({sigmas:.0f} sigma): wheels, rates and "
+    "attitude must be in one body frame, and an element is off by about that angle times the difference of two moments",
+    "Bring all three into one frame: a star tracker's alignment belongs into the quaternion.",
+)  # fmt: skip
 
 
 def slew_record(subject: Subject) -> SlewRecord:
     """Raises BadInput where wheels, or both of rates and attitude, are missing, and where nothing usable is left."""
+    check_wheels(subject)
     reader = _Reader(subject)
     rates, attitude = reader.rates(), reader.attitude()
     _check_motion(subject.telemetry, rates, attitude)
@@ -90,13 +99,25 @@ def slew_record(subject: Subject) -> SlewRecord:
         NO_RATES() if len(rates.time_s) == 0 else None,
         *held.doubts,
         reader.doubt_of(firing),
+        _tilted(rates, attitude),
     ]
     counts = {stem: _count(subject.telemetry, stem) for stem in ("wheel_rate", "body_rate", "quaternion")}
     made = SlewRecord(
         zero_s=reader.zero_s, momentum=momentum, rates=rates, attitude=attitude, arcs=tuple(arcs), wheels=held.names,
-        axes=held.axes, relative=subject.relative, counts=counts, doubts=Doubts(found),
+        axes=held.axes, spins=held.spins, relative=subject.relative, counts=counts, doubts=Doubts(found),
     )  # fmt: skip
     return with_orbit(made, subject.telemetry, reader.start_ns, subject.inertia_kgm2)
+
+
+def check_wheels(subject: Subject) -> None:
+    """Raises BadInput for a craft that has no wheels, and whose telemetry has no momentum either."""
+    name = subject.craft.craft.name
+    if not subject.craft.craft.wheels and not subject.telemetry.has_axes("wheel_momentum"):
+        raise BadInput(
+            f"{name} has no wheels, and it is the momentum that wheels hold which tells the inertia",
+            file=subject.telemetry.source or None,
+            remedy="Describe them as [[wheels]] in the craft file, or add wheel_momentum_x, _y, _z.",
+        )
 
 
 def _check_motion(tlm: Telemetry, rates: RateSamples, attitude: AttitudeSamples) -> None:
@@ -115,6 +136,28 @@ def _check_motion(tlm: Telemetry, rates: RateSamples, attitude: AttitudeSamples)
             channel="body_rate_x",
             remedy="The tensor would be wrong by that factor: put the right unit into the column's header.",
         )
+
+
+def _tilted(rates: RateSamples, attitude: AttitudeSamples) -> Doubt | None:
+    """Whether the quaternion's rates are those of the gyros in other axes: gyros = (1 + scale) (rate + angle x rate) + bias, by least
+    squares over blocks, in which there is hardly any noise."""
+    if len(rates.time_s) == 0 or len(attitude.time_s) < 2 * _TILT_BLOCKS:
+        return None
+    mid, rate = rates_between(attitude.time_s, attitude.q_NB)
+    parts = [(rates.time_s[rates.axis == j], rates.value_rad_s[rates.axis == j]) for j in range(3)]
+    gyro = np.stack([np.interp(mid, t, v) for t, v in parts], axis=1)
+    r, g = (np.array([p.mean(axis=0) for p in np.array_split(x, _TILT_BLOCKS)]) for x in (rate, gyro))
+    X = np.concatenate([np.cross(np.eye(3)[None], r[:, None, :]).swapaxes(1, 2), r[:, :, None], np.tile(np.eye(3), (len(r), 1, 1))], axis=2)
+    X, y = X.reshape(-1, 7), (g - r).ravel()
+    size = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+    inverse = np.linalg.pinv((X / size).T @ (X / size), rcond=1e-6, hermitian=True)
+    found = inverse @ ((X / size).T @ y)
+    left = float(np.sum((y - X / size @ found) ** 2)) / (len(y) - 7)
+    angle = found[:3] / size[:3]
+    covariance = left * inverse[:3, :3] / np.outer(size[:3], size[:3])
+    sigmas = float(np.sqrt(max(angle @ np.linalg.pinv(covariance, rcond=1e-6, hermitian=True) @ angle, 0.0)))
+    off = float(np.linalg.norm(angle))
+    return TILTED(angle_deg=np.degrees(off), sigmas=sigmas) if off > _TILT and sigmas > _TILT_SIGMAS else None
 
 
 def _count(tlm: Telemetry, stem: str) -> float:
@@ -156,6 +199,7 @@ class _Held:
     spans: list[tuple[float, float]]
     names: tuple[str, ...]
     axes: np.ndarray
+    spins: tuple[np.ndarray, np.ndarray] | None
     doubts: list[Doubt]
 
 
@@ -265,17 +309,20 @@ class _Reader:
             self.subject.wheels()  # refuses unknown and missing wheels
             sources = self.wheels()
         spans, doubts = self.wheel_spans(sources)
-        parts = []
+        parts, spins = [], None
         for a, b in spans:
             series = [self.series(s, a, b) for s in sources if self.reports(s, a, b)]
             part = _components_together(series)
             if part is None:
                 part = _components_apart(series)
                 doubts.append(WHEELS_APART())
+            elif len(spans) == 1:
+                common = np.unique(part.time_s)
+                spins = common, np.stack([s.value[np.searchsorted(s.time_s, common)] for s in series], axis=1)
             parts.append(part)
         fields = MomentumSamples.__annotations__
         samples = MomentumSamples(*(np.concatenate([getattr(p, f) for p in parts]) for f in fields))
-        return _Held(samples, spans, tuple(s.name for s in sources), np.array([s.per_reading for s in sources]), doubts)
+        return _Held(samples, spans, tuple(s.name for s in sources), np.array([s.per_reading for s in sources]), spins, doubts)
 
     def wheels(self) -> list[_Source]:
         """All wheels that are in service at some time of the record."""

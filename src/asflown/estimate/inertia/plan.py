@@ -5,6 +5,9 @@ at each sample, the hold before and after it counted: the start momentum is comm
 with them, which takes the mean off.  That the body turns meanwhile is left out: after a turn of
 25 degrees sigmas are too large by up to 7 %.
 
+What has been flown counts as `asflown inertia` finds it, with its sigma: gravity, outside torques and noise as they were.  A new turn is
+worth as much, for its S^T S, as those flown: a sample's noise is scaled so that their information is what the fit says.
+
 Chosen is the direction with the smallest determinant of the posterior covariance (D-optimal: the same whatever the
 axes and units), starting from a prior of Feldman and Lee's requirement, 10 % on moments and 75 kg m2 on products, one
 sigma each.
@@ -12,7 +15,7 @@ sigma each.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
@@ -31,7 +34,9 @@ from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
 from ..subject import subject_of
 from .excitation import excitation, named, normal_matrix
+from .gather import check_wheels
 from .prior import PRODUCT_SHARE, prior_sigma
+from .tensor import whole_motion_of
 
 if TYPE_CHECKING:
     from ...craft.model import Craft, CraftAt
@@ -45,11 +50,16 @@ _DIRECTIONS = 2000  # over the sphere: neighbours 4 degrees apart
 _SLOWER = np.linspace(1.0, 0.05, 20)  # rates tried, as shares of that wanted
 _HOLD_S = 60.0
 _CADENCE_S = 4.0  # of the samples of a plan from nothing
+_SEEN = 1e-4  # of the largest information: what is less has not been flown
 _NOISE_WINDOW = 5.0  # half-width of the fits whose residuals are the rates' noise, in samples
 
 NOISE_ONLY = Kind(
     "inertia.plan-noise-only", Severity.CAUTION,
     "the sigmas include noise only: scale errors of the spin inertia and of the gyros add 0.2 to 1 %",
+)  # fmt: skip
+NOT_FITTED = Kind(
+    "inertia.plan-not-fitted", Severity.SUSPECT,
+    "the fit of what has been flown did not settle: its sigma here is that of the sensors' noise alone", "Take a shorter window.",
 )  # fmt: skip
 RATIOS_ONLY = Kind(
     "inertia.plan-ratios-only", Severity.NOTE,
@@ -244,7 +254,8 @@ def slew_plan(
             remedy='Give it: --inertia "Ixx,Iyy,Izz,Ixy,Ixz,Iyz" in kg m2.',
         )
     noise = momentum_noise(I_B, now.wheels, flown.rate_sigma, wheel_sigma_rad_s)
-    known = np.diag(1 / prior_sigma(I_B) ** 2) + _information(flown.square, noise)
+    known, share = _known(I_B, flown, noise)
+    noise = noise * share
     wheels = _Wheels(now, flown.wheel_rates if wheel_rates_rad_s is None else wheel_rates_rad_s)
     tried = [
         _tried(axis, speed, turn, flown.cadence_s, known, noise)
@@ -287,12 +298,16 @@ def _plan_doubts(now: CraftAt, tried: list[_Tried]) -> list[Doubt]:
 
 @dataclass(frozen=True)
 class _Flown:
-    """Body rates (N, 3) of what has been flown, wheel rates at its end (None: at rest), cadence, and noise of a rate sample."""
+    """Body rates (N, 3) of what has been flown, wheel rates at its end (None: at rest), cadence, noise of a rate sample, and what
+    method 'consistent' finds in it: information (6, 6) on the elements, that of the craft's own tensor included where slews do not
+    identify all of it; None where nothing is found."""
 
     omega_B: np.ndarray = field(default_factory=lambda: np.zeros((1, 3)))
     wheel_rates: list[float] | None = None
     cadence_s: float = _CADENCE_S
     rate_sigma: float = RATE_SIGMA
+    found: np.ndarray | None = None
+    leaning: bool = False
 
     @property
     def square(self) -> np.ndarray:
@@ -307,7 +322,29 @@ def _begun(craft: Craft, telemetry: Telemetry | None, date: str | None) -> tuple
         now = craft.at(None if date is None else int(utc_to_tai_ns(date)))
         return now, _Flown(), now.doubts
     subject = subject_of(telemetry, craft)
-    return subject.craft, _flown_in(subject), subject.doubts
+    check_wheels(subject)
+    flown = _flown_in(subject)
+    if excitation(flown.omega_B, flown.rate_sigma).rank == 0:
+        return subject.craft, flown, subject.doubts
+    answer = whole_motion_of(subject)
+    doubts = subject.doubts + Doubts([d for d in answer.doubts if d is not None and d.severity >= Severity.SUSPECT])
+    if not np.isfinite(answer.covariance).all():
+        return subject.craft, flown, doubts + Doubts([NOT_FITTED()])
+    found = np.linalg.inv(answer.covariance)
+    return subject.craft, replace(flown, found=found, leaning=answer.excitation.rank < 6), doubts
+
+
+def _known(I_B: np.ndarray, flown: _Flown, noise: np.ndarray) -> tuple[np.ndarray, float]:
+    """Information (6, 6) on the elements so far, and the share of a sample's ``noise`` (3,) that it shows."""
+    prior, by_samples = np.diag(1 / prior_sigma(I_B) ** 2), _information(flown.square, noise)
+    if flown.found is None:
+        return prior + by_samples, 1.0
+    told = flown.found - prior if flown.leaning else flown.found
+    values, vectors = np.linalg.eigh(by_samples)
+    seen = vectors[:, values > _SEEN * values[-1]]
+    both = [np.linalg.slogdet(seen.T @ m @ seen) for m in (told, by_samples)]
+    share = float(np.exp((both[1][1] - both[0][1]) / (2 * seen.shape[1]))) if both[0][0] > 0 else 1.0
+    return flown.found, share
 
 
 def _flown_in(subject: Subject) -> _Flown:

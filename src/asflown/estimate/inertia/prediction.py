@@ -21,6 +21,8 @@ ROWS = {"Ixx": (0, 0), "Iyy": (1, 1), "Izz": (2, 2), "Ixy": (0, 1), "Ixz": (0, 2
 MET, NOT_MET, OPEN = "met", "not met", "open"
 #: Moments whose ratio is this near to a unit's factor, and alike within this, are taken for a wrong unit.
 _NEAR_FACTOR, _ALIKE = 1.25, 1.5
+#: A common factor beyond this is no error of a prediction, whose moments are known to a tenth.
+_OFF_SCALE = 1.4
 
 NO_PREDICTION = Kind(
     "inertia.no-prediction", Severity.NOTE,
@@ -39,6 +41,12 @@ IMPOSSIBLE = Kind(
 WRONG_UNIT = Kind(
     "inertia.wrong-unit", Severity.SUSPECT,
     "all moments are {ratio:.3g} times the predicted ones: are the {guesses}?", "Check the units of these channels.",
+)  # fmt: skip
+OFF_SCALE = Kind(
+    "inertia.off-scale", Severity.SUSPECT,
+    "all moments are {ratio:.3g} times the predicted ones, more than a prediction is wrong by: the wheels' spin inertia, or the factor of "
+    "their rates, is the scale of the tensor",
+    "Check spin_inertia in the craft file and the wheels' rates, or the prediction.",
 )  # fmt: skip
 
 
@@ -256,7 +264,7 @@ def compare_inertia(estimate, prediction: Prediction, *, sigma=None, relative: b
         rows.append(Compared(name, predicted, estimated, s, error, s_error, asked, _verdict(error, s_error, asked)))
     moments = np.linalg.eigvalsh(I_B)
     margin = float(moments.sum() / 2 - moments[-1])
-    found = [_impossible(float(moments[0]), margin), _wrong_unit(I_B, prediction.inertia_kgm2)]
+    found = [_impossible(float(moments[0]), margin), _wrong_unit(I_B, prediction.inertia_kgm2, relative=relative)]
     return InertiaComparison(
         prediction, tuple(rows), float(moments[0]), margin, relative, prediction.doubts + Doubts(found)
     )
@@ -276,7 +284,7 @@ def _impossible(smallest: float, margin: float) -> Doubt | None:
     return IMPOSSIBLE(quantity="triangle margin", value=margin) if margin < 0 else None
 
 
-def _wrong_unit(estimate, predicted) -> Doubt | None:
+def _wrong_unit(estimate, predicted, *, relative: bool) -> Doubt | None:
     """Moments are a wheel's rate over the body's: a factor in either shows in all three."""
     ratio = np.diag(estimate) / np.diag(predicted)
     if (ratio <= 0).any() or ratio.max() / ratio.min() > _ALIKE:
@@ -288,4 +296,6 @@ def _wrong_unit(estimate, predicted) -> Doubt | None:
         for factor, words in MISTAKEN_UNITS.items()
         if abs(np.log(scale / factor)) < np.log(_NEAR_FACTOR)
     ]
-    return WRONG_UNIT(ratio=mean, guesses=", or the ".join(guesses)) if guesses else None
+    if guesses:
+        return WRONG_UNIT(ratio=mean, guesses=", or the ".join(guesses))
+    return OFF_SCALE(ratio=mean) if not relative and abs(np.log(mean)) > np.log(_OFF_SCALE) else None
