@@ -50,6 +50,7 @@ MADE = {
     "TorqueResult, fused": lambda: asflown.torque(telemetry("profile-1"), CASSINI, axis="y", prior="matern"),
     "TorqueResult, transfer": lambda: asflown.torque(telemetry("profile-1"), CASSINI, method="transfer", axis="y"),
     "ExternalTorqueResult": lambda: asflown.external_torque(telemetry("quiet"), CASSINI),
+    "SourcesResult": lambda: asflown.sources(telemetry("leo-nadir"), asflown.load_craft("pyramid")),
     "WheelsResult": lambda: asflown.wheels(telemetry("wheel-run-down"), CASSINI),
     "InertiaResult": lambda: asflown.inertia(telemetry("slews"), CASSINI, method="axis"),
     "SlewPlanResult": lambda: asflown.slew_plan(CASSINI, telemetry("slews")),

@@ -28,6 +28,10 @@ def external_torque(
         "--turn-rate",
         help='Mean body rate for the drift\'s w x H, as in "0 2e-8 0 rad/s"; else from the quaternion.',
     ),
+    known: str = typer.Option(
+        None, "--with", help="Known torques taken off, some of gravity-gradient,sunlight,dipole,drag,rods."
+    ),
+    air: str = AIR,
     start: str = START,
     stop: str = STOP,
     channels: Path = CHANNELS,
@@ -42,5 +46,5 @@ def external_torque(
 
     job = Job(context)
     turn = None if turn_rate is None else numbers(turn_rate, "rad/s", 3)
-    result = steady_torque(job.telemetry(), job.craft, method=method, variant=variant, frame=frame, turn_rad_s=turn)
+    result = steady_torque(job.telemetry(), job.craft, method=method, variant=variant, frame=frame, turn_rad_s=turn, known=names_of(known) or (), air=air_of(air))
     job.finish(result, options={"method": result.method})

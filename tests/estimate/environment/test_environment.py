@@ -73,9 +73,7 @@ def test_trap_a_sun_sensor_in_other_axes_is_doubted():
         swapped = {"sun_direction_x": "sun_direction_z", "sun_direction_z": "sun_direction_x"}
         return replace(
             tlm,
-            channels={
-                n: replace(tlm.channels[swapped.get(n, n)], name=n) for n in tlm.channels
-            },
+            channels={n: replace(tlm.channels[swapped.get(n, n)], name=n) for n in tlm.channels},
         )
 
     around, _ = of(turned)

@@ -21,7 +21,7 @@ from ...dynamics.orbit import BODIES
 from ...dynamics.rigid_body import ELEMENTS, elements_of
 from ...dynamics.surfaces import drag_torque, sunlight_torque
 from ...kit.doubts import Doubts
-from ...kit.errors import check_choice
+from ...kit.errors import BadInput, check_choice, some_of
 from ...kit.timeline import NS
 from ...telemetry.channels import AXES
 from ..subject import OF_THE_SUN, sky_doubts
@@ -143,6 +143,23 @@ def environment_of(
         phase_rad=None if place.velocity_N is None else place.phase,
         doubts=Doubts([*doubts, *of_sun]),
     )
+
+
+#: What the craft file has to say for each.
+_BELIEFS = {
+    "gravity-gradient": "an inertia", "sunlight": "[sunlight]", "dipole": "[magnetics]", "drag": "[aerodynamics]",
+    "rods": "[[torque_rods]]",
+}  # fmt: skip
+
+
+def known_terms(subject: Subject, tai_ns: np.ndarray, names: Sequence[str], air: Air | None = None) -> Environment:
+    """Terms whose torque the craft file knows, to be taken off.  Raises BadInput where one of them cannot be computed."""
+    around = environment_of(subject, tai_ns, names, air)
+    missing = [f"{name} needs {what}" for name, what in around.left_out.items()]
+    missing += [f"{t.name} needs {_BELIEFS[t.name]} in the craft file" for t in around.terms if t.torque_Nm is None]
+    if missing:
+        raise BadInput(f"not all known torques can be computed: {some_of(missing)}", remedy="Leave these out of --with.")
+    return around
 
 
 def _place(subject: Subject, tai_ns: np.ndarray) -> tuple[Place, Doubts, str]:

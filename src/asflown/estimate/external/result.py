@@ -36,6 +36,7 @@ class ExternalTorqueRecord(TypedDict):
     wheel_drift_rpm_per_day: dict[str, Number]
     start_s: Number
     duration_s: Number
+    known: Annotated[dict[str, str], Doc("torques that were taken off, and where their vectors are from")]
     samples: int
     samples_used: int
     independent_samples: Annotated[Number, Doc("effective sample size of the residuals")]
@@ -85,6 +86,7 @@ class ExternalTorqueResult(Estimate):
     wheel_drift_rad_s2: dict[str, float] = field(default_factory=dict)
     effective_samples: float | None = None  # how many independent samples the used ones amount to
     relative: bool = False
+    known: dict[str, str] = field(default_factory=dict)  # torques taken off, and where their vectors are from
 
     @property
     def duration_s(self) -> float:
@@ -108,6 +110,7 @@ class ExternalTorqueResult(Estimate):
             "wheel_drift_rpm_per_day": {n: _RPM_PER_DAY * v for n, v in self.wheel_drift_rad_s2.items()},
             "start_s": self.time_s[0],
             "duration_s": self.duration_s,
+            "known": self.known,
             "samples": len(self.time_s),
             "samples_used": int(self.used.sum()),
             "independent_samples": self.effective_samples,

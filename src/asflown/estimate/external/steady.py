@@ -15,7 +15,7 @@ of the residuals times how many of them are worth one (``kit.regression.memory``
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -114,6 +114,8 @@ def external_torque(
     variant: str = "corrected",
     frame: str = "body",
     turn_rad_s=None,
+    known: Sequence[str] = (),
+    air: Air | None = None,
 ) -> ExternalTorqueResult:
     """The constant external torque on the craft, from the momentum that craft and wheels gain.
 
@@ -132,6 +134,11 @@ def external_torque(
         Axes in which the torque is constant; 'inertial' is that of the quaternion.
     turn_rad_s : array_like of shape (3,), optional
         Mean body rate, body axes [rad/s], for the drift's w x H; from quaternion or gyros unless given.
+    known : sequence of str
+        Torques of the surroundings that are taken off, as the craft file has them: of 'gravity-gradient', 'sunlight', 'dipole',
+        'drag', 'rods'.  Their errors stand in the systematic sigma.
+    air : Air, optional
+        For the density of drag.
 
     Returns
     -------
@@ -177,7 +184,8 @@ def external_torque(
         if variant == "printed":
             result = _printed(subject, alternative=alternative)
         else:
-            result = _drift(subject, turn_rad_s) if method == "drift" else _momentum(subject, frame)
+            taken = _Taken(subject, tuple(known), air)
+            result = _drift(subject, turn_rad_s, taken) if method == "drift" else _momentum(subject, frame, taken)
     except BadInput as why:
         raise why.within(telemetry.source) from why.__cause__
     found = [*subject.doubts, *result.doubts, PER_SPIN_INERTIA(what="the torque is") if subject.relative else None]
@@ -252,7 +260,34 @@ class _Course:
         return np.concatenate([back, back @ self.G], axis=2)
 
 
-def _drift(subject: Subject, turn) -> ExternalTorqueResult:
+@dataclass
+class _Taken:
+    """Known torques to take off: what they and one sigma of each of their errors bring to the momentum, body axes."""
+
+    subject: Subject
+    names: tuple[str, ...]
+    air: Air | None
+    where_from: dict[str, str] = field(default_factory=dict)
+    errors: np.ndarray | None = None  # (N, 3, q)
+    doubts: Doubts = Doubts()
+
+    def brought(self, s: Samples, turned: Rotation) -> np.ndarray:
+        """Momentum that the known torques brought since the first sample, (N, 3)."""
+        if not self.names:
+            return np.zeros_like(s.momentum)
+        around = known_terms(self.subject, s.tai_ns, self.names, self.air)
+        self.doubts = around.doubts
+        self.where_from = {t.name: t.source for t in around.terms}
+        torque = np.sum([t.torque_Nm for t in around.terms], axis=0)
+        errors = [t.errors_Nm for t in around.terms if t.errors_Nm is not None]
+        R = turned.as_matrix()
+        whole = np.concatenate([torque[:, :, None], *errors], axis=2)
+        grown = np.swapaxes(R, 1, 2) @ cumulative_trapezoid(R @ whole, s.seconds, axis=0, initial=0)
+        self.errors = grown[:, :, 1:]
+        return grown[:, :, 0]
+
+
+def _drift(subject: Subject, turn, taken: _Taken) -> ExternalTorqueResult:
     s = samples_of(subject)
     t, H = s.seconds, s.momentum
     w, w_sigma, turn_from, w_unknown, doubts = _turn(s, turn)
@@ -260,7 +295,7 @@ def _drift(subject: Subject, turn) -> ExternalTorqueResult:
     course = _Course(
         method="drift",
         frame="body",
-        y=H + np.cross(w, cumulative_trapezoid(H, t, axis=0, initial=0)),
+        y=H + np.cross(w, cumulative_trapezoid(H, t, axis=0, initial=0)) - taken.brought(s, Rotation.identity(len(t))),
         turned=Rotation.identity(len(t)),
         G=t[:, None, None] * np.eye(3),
         unknown=_crossed(mean, np.full(3, w_unknown)),
@@ -270,7 +305,7 @@ def _drift(subject: Subject, turn) -> ExternalTorqueResult:
         turn=w,
         gyroscopic=np.cross(w, mean),
     )
-    return _fitted(subject, s, course)
+    return _fitted(subject, s, course, taken)
 
 
 def _turn(s: Samples, given):
@@ -295,7 +330,7 @@ def _crossed(H, sigma) -> np.ndarray:
     return np.hypot(sigma[a] * H[b], sigma[b] * H[a])
 
 
-def _momentum(subject: Subject, frame: str) -> ExternalTorqueResult:
+def _momentum(subject: Subject, frame: str, taken: _Taken) -> ExternalTorqueResult:
     subject.known_inertia()
     s = samples_of(subject)
     if s.rates is None:
@@ -317,10 +352,11 @@ def _momentum(subject: Subject, frame: str) -> ExternalTorqueResult:
         G = cumulative_trapezoid(s.turned.as_matrix(), t, axis=0, initial=0)
     else:
         G = t[:, None, None] * from_start.as_matrix()
-    return _fitted(subject, s, _Course("momentum", frame, s.momentum, s.turned, G, unknown, turn_from, doubts))
+    y = s.momentum - taken.brought(s, s.turned)
+    return _fitted(subject, s, _Course("momentum", frame, y, s.turned, G, unknown, turn_from, doubts), taken)
 
 
-def _fitted(subject: Subject, s: Samples, course: _Course) -> ExternalTorqueResult:
+def _fitted(subject: Subject, s: Samples, course: _Course, taken: _Taken) -> ExternalTorqueResult:
     tlm, fit = subject.telemetry, regress(course.rows, course.y)
     if course.turn_sigma is not None:
         fit = replace(fit, covariance=fit.covariance + np.diag(np.r_[np.zeros(3), course.turn_sigma**2]))
@@ -328,6 +364,9 @@ def _fitted(subject: Subject, s: Samples, course: _Course) -> ExternalTorqueResu
     systematic = np.sqrt(
         (spin * fit.shift(s.stored)) ** 2 + (INERTIA_SHARE * fit.shift(s.body)) ** 2 + course.unknown**2
     )
+    if taken.errors is not None:
+        shifts = np.array([fit.shift(e) for e in np.moveaxis(taken.errors, 2, 0)])
+        systematic = np.sqrt(systematic**2 + np.sum(shifts**2, axis=0))
     gained_variance = np.einsum("nij,jk,nik->ni", course.G, fit.covariance[3:, 3:], course.G)
     inertia = "inertia_per_spin_inertia" if subject.craft.relative else "inertia_kg_m2"
     return ExternalTorqueResult(
@@ -352,7 +391,8 @@ def _fitted(subject: Subject, s: Samples, course: _Course) -> ExternalTorqueResu
         used=fit.used,
         effective_samples=fit.worth,
         relative=subject.relative,
-        doubts=Doubts([*s.doubts, *course.doubts, *_quality(fit, course, systematic)]),
+        doubts=Doubts([*s.doubts, *course.doubts, *taken.doubts, *_quality(fit, course, systematic)]),
+        known=taken.where_from,
         settings={inertia: subject.inertia_kgm2, "wheels": [w.name for w in subject.craft.wheels]},
     )
 

@@ -44,7 +44,7 @@ def with_orbit(record: SlewRecord, telemetry: Telemetry, start_ns: int, I_B: np.
     if orbit is None:
         few = ORBIT_TOO_SHORT(why=f"{count} positions", left_out="by an unknown amount") if count and not doubts else None
         return _without(record, *doubts, few)
-    doubts = doubts + [GRAVITY(body=body)]
+    doubts = Doubts([*doubts, GRAVITY(body=body)])
     left_out = words(orbit)
     if not record.has_attitude:
         return _without(record, *doubts, NO_ATTITUDE_FOR_GRAVITY(left_out=left_out))

@@ -24,12 +24,12 @@ _BETTER = 10.0
 
 LEFT_OVER = Kind(
     "sources.left-over", Severity.CAUTION,
-    "a torque of {left_Nm:.2g} N m (rms, {percent:.0f} % of what is seen) that changes over {lasts_s:.0f} s is explained by no source; the intervals hold it",
+    "a torque of {left:.2g} {unit} (rms, {percent:.0f} % of what is seen) that changes over {lasts_s:.0f} s is explained by no source; the intervals hold it",
     "Look at the residual: --plot.",
 )  # fmt: skip
 NOT_EXPLAINED = Kind(
     "sources.not-explained", Severity.SUSPECT,
-    "no source explains {percent:.0f} % of the torque that is seen ({left_Nm:.2g} N m rms, over {lasts_s:.0f} s): something else acts, or a "
+    "no source explains {percent:.0f} % of the torque that is seen ({left:.2g} {unit} rms, over {lasts_s:.0f} s): something else acts, or a "
     "known quantity is wrong (inertia, wheel axes, frames)",
     "Look at the residual: --plot.  Add channels of what is missing, or take a span without it.",
 )  # fmt: skip
@@ -49,7 +49,7 @@ STEPS = Kind(
     "Narrow the span (--start, --stop), or exclude it (--exclude).",
 )  # fmt: skip
 NO_CONSTANT = Kind(
-    "sources.no-constant", Severity.NOTE,
+    "sources.no-constant", Severity.CAUTION,
     "a constant torque is left out: it would explain no more than chance does (p = {p_value:.2g}). With one, {what} would be known "
     "{factor:.0f} times worse",
     "Give --sources with constant to have it in.",
@@ -61,6 +61,12 @@ SIMPLER = Kind(
 NO_SOURCE = Kind(
     "sources.left-out", Severity.NOTE, "{source} is not looked for: it needs {needs}", "Add these.",
 )  # fmt: skip
+OWN_HARMONICS = Kind(
+    "sources.own-harmonics", Severity.CAUTION,
+    "what swings with two and more times the orbit's rate does so about each axis by itself: that is no density alone (arrays that turn, "
+    "with the inertia and the drag), and stands under drag, whose levers are rough",
+    "Look at drag's part: --plot.",
+)  # fmt: skip
 SHORT = Kind(
     "sources.short", Severity.CAUTION,
     "the arc is {percent:.0f} % of an orbit: sources that change over the orbit look alike",
@@ -69,17 +75,30 @@ SHORT = Kind(
 
 
 def fit_doubts(
-    white: Whitened, arc: Arc, theta: np.ndarray, residual: Residual, models: tuple[Model, ...], fitted: tuple[str, ...]
+    white: Whitened,
+    theta: np.ndarray,
+    residual: Residual,
+    models: tuple[Model, ...],
+    fitted: tuple[str, ...],
+    *,
+    relative: bool,
 ) -> list[Doubt]:
-    doubts = [NO_SOURCE(source=n, needs=w) for n, w in arc.environment.left_out.items() if n != "rods"]
-    return [*doubts, *_left(white, arc, theta), *_noise(white, residual), *_choice(models, fitted), *_span(arc)]
+    return [
+        *_left(white, theta, relative=relative), *_noise(white, residual), *_choice(models, fitted), *_of_drag(white.arc),
+        *_span(white.arc),
+    ]  # fmt: skip
 
 
-def _left(white: Whitened, arc: Arc, theta: np.ndarray) -> list[Doubt]:
+def _left(white: Whitened, theta: np.ndarray, *, relative: bool) -> list[Doubt]:
     """The slow torque, as smoothed: a size that the fit allows but does not need is none."""
     slow = float(np.sqrt(np.mean(np.sum(white.slow_torque(theta) ** 2, axis=1))))
-    seen = max(arc.size_Nm, slow)
-    told = {"left_Nm": slow, "percent": 100 * slow / seen, "lasts_s": white.levels.slow_s}
+    seen = max(white.arc.size_Nm, slow)
+    told = {
+        "left": slow,
+        "unit": "rad/s2 per unit spin inertia" if relative else "N m",
+        "percent": 100 * slow / seen,
+        "lasts_s": white.levels.slow_s,
+    }
     if slow > _MUCH * seen:
         return [NOT_EXPLAINED(**told)]
     return [LEFT_OVER(**told)] if slow > _LEFT * seen else []
@@ -106,6 +125,10 @@ def _choice(models: tuple[Model, ...], fitted: tuple[str, ...]) -> list[Doubt]:
     if whole.bic_above_best < _BETTER or models[0].sources == fitted:
         return []
     return [SIMPLER(better=list(models[0].sources) or "no source", bic=whole.bic_above_best)]
+
+
+def _of_drag(arc: Arc) -> list[Doubt]:
+    return [OWN_HARMONICS()] if arc.own_harmonics else []
 
 
 def _span(arc: Arc) -> list[Doubt]:

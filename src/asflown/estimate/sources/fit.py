@@ -12,7 +12,7 @@ from ...kit.errors import BadInput, check_choice
 from ...kit.result import recorded
 from ..subject import PER_SPIN_INERTIA, subject_of
 from .compare import Model, compare
-from .doubts import NO_CONSTANT, fit_doubts
+from .doubts import NO_CONSTANT, NO_SOURCE, fit_doubts
 from .gather import ALONE, DENSITY, Arc, gather, with_harmonics
 from .residual import residual_of
 from .result import Fitted, SourcesResult
@@ -100,18 +100,20 @@ def sources(
 
 
 def _whitened(arc: Arc, fitted: tuple[str, ...], *, modelled: bool) -> Whitened:
-    """With the density's higher harmonics, which are those of the lever found: of each axis' own first, then of the lever, again and again."""
+    """With higher harmonics of drag, whichever are likelier: the density's, common to the axes and following the lever found, or such
+    of each axis' own, where what swings with the orbit is not the density alone (arrays that turn)."""
     if "drag" not in fitted:
         return whitened(arc)
     drag = arc.of("drag")
     per_lever = arc.torque[:, :, drag]
     # a lever as large as the torque that is seen, until one is known
-    white = whitened(with_harmonics(arc, per_lever / ALONE, modelled=modelled))
+    white = best = whitened(with_harmonics(arc, per_lever / ALONE, modelled=modelled))
     least = tuple(n for n in fitted if n != "constant")
     for _ in range(_ROUNDS):
         lever = posterior(white, least, _CELLS).whole(white)[: len(drag)][drag]
         white = whitened(with_harmonics(arc, (per_lever @ lever)[:, :, None], modelled=modelled), white.levels)
-    return white
+        best = min(best, white, key=lambda w: w.cost)
+    return best
 
 
 def _result(
@@ -123,8 +125,10 @@ def _result(
     told = _told(arc, found)
     theta = found.whole(white)
     residual = residual_of(white, theta)
+    left_out = {n: w for n, w in around.left_out.items() if n in asked or n == "gravity-gradient"}
     doubts = [
-        *subject.doubts, *arc.doubts, *chosen, *fit_doubts(white, arc, theta, residual, models, fitted),
+        *subject.doubts, *arc.doubts, *(NO_SOURCE(source=n, needs=w) for n, w in left_out.items()), *chosen,
+        *fit_doubts(white, theta, residual, models, fitted, relative=subject.relative),
         PER_SPIN_INERTIA(what="the torque is") if subject.relative else None,
     ]  # fmt: skip
     return SourcesResult(
@@ -145,7 +149,7 @@ def _result(
         models=models,
         relative=subject.relative,
         where_from={t.name: t.source for t in around.terms},
-        left_out={n: w for n, w in around.left_out.items() if n in asked or n == "gravity-gradient"},
+        left_out=left_out,
         settings=_settings(white),
         doubts=Doubts(doubts),
     )
@@ -163,7 +167,9 @@ def _needed(white: Whitened, models: tuple[Model, ...], fitted: tuple[str, ...])
     if chance < _BY_CHANCE:
         return fitted, []
     names = white.arc.columns
-    kept = [(int(c), k) for k, c in enumerate(np.flatnonzero(posterior(white, without).kept)) if names[c].source in without]
+    kept = [
+        (int(c), k) for k, c in enumerate(np.flatnonzero(posterior(white, without).kept)) if names[c].source in without
+    ]
     one, other = posterior(white, without), posterior(white, fitted)
     place = {int(c): k for k, c in enumerate(np.flatnonzero(other.kept))}
     with_it, without_it = np.diag(other.spread), np.diag(one.spread)

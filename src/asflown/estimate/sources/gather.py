@@ -91,6 +91,7 @@ class Arc:
     step_s: float
     environment: Environment
     doubts: Doubts
+    own_harmonics: bool = False  # drag's harmonics are of each axis' own
 
     @property
     def phase(self) -> np.ndarray | None:
@@ -169,7 +170,8 @@ def with_harmonics(arc: Arc, drag: np.ndarray, *, modelled: bool) -> Arc:
     grown = cumulative_trapezoid(arc.turn @ torque, arc.time_s, axis=0, initial=0)
     columns = tuple(Column("", f"{DENSITY} {k}", "", 1.0) for k in range(torque.shape[2]))
     Z = np.concatenate([arc.Z, np.swapaxes(arc.turn, 1, 2) @ grown], axis=2)
-    return replace(arc, Z=Z, columns=(*arc.columns, *columns), torque=np.concatenate([arc.torque, torque], axis=2))
+    whole = np.concatenate([arc.torque, torque], axis=2)
+    return replace(arc, Z=Z, columns=(*arc.columns, *columns), torque=whole, own_harmonics=drag.shape[2] > 1)
 
 
 class _Means:
@@ -317,7 +319,7 @@ def _columns(subject: Subject, course: _Course, around: Environment, which: Sequ
 def _penumbra(middle: np.ndarray, lit: np.ndarray, edge: int) -> float:
     """How long the light takes to go at an edge of the shadow; long where the craft grazes it. [s]
 
-    The Earth's flattening, which the geometry leaves out, is as wide as the penumbra."""
+    Refraction and absorption, which the geometry leaves out, dim light that passes as low as the penumbra is wide."""
     whole = np.flatnonzero((lit < 0.02) | (lit > 0.98))
     before, after = whole[whole <= edge], whole[whole > edge]
     first, last = (before[-1] if len(before) else 0), (after[0] if len(after) else len(lit) - 1)

@@ -58,6 +58,11 @@ class Whitened:
     def log_size(self) -> float:
         return float(0.5 * np.sum(np.log(2 * np.pi * self.filtered.variance)))
 
+    @cached_property
+    def cost(self) -> float:
+        """Minus the log restricted likelihood."""
+        return _restricted(self.filtered)
+
     def slow_torque(self, theta: np.ndarray) -> np.ndarray:
         """The unexplained torque at the blocks' middles, body axes (K, 3)."""
         return smooth(self.steps, self.filtered, theta).mean[:, 3:]
@@ -119,8 +124,11 @@ def _solve(information: np.ndarray) -> np.ndarray:
 
 
 def _cost(arc: Arc, levels: Levels, kept: np.ndarray) -> float:
-    """Minus the log restricted likelihood."""
-    filtered = run(_steps(arc, levels, kept))
+    return _restricted(run(_steps(arc, levels, kept)))
+
+
+def _restricted(filtered: Filtered) -> float:
+    """Minus the log restricted likelihood: of the readings with the unknowns integrated out under their priors."""
     info = filtered.information
     N = info[1:, 1:] + np.eye(len(info) - 1)
     least = info[0, 0] - info[1:, 0] @ np.linalg.solve(N, info[1:, 0])
