@@ -7,6 +7,8 @@ import os
 import sys
 from pathlib import Path
 
+from PIL import Image
+
 import asflown
 
 DATA = Path(os.environ.get("ASFLOWN_FLIGHT_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data")
@@ -27,7 +29,11 @@ def main(folder: Path) -> None:
         print(f"\n== {name}\n{result}")
         for doubt in result.doubts.gravest_first:
             print(f"  {doubt.severity.label}: {doubt}")
-        asflown.save_figure(result, folder / f"{name}.png")
+        path = folder / f"{name}.png"
+        asflown.save_figure(result, path)
+        with Image.open(path) as picture:  # few colours are in it: a palette halves the file
+            small = picture.convert("RGB").quantize(48)
+        small.save(path, optimize=True)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from pathlib import Path
 import typer
 
 from .job import Job
-from .options import CHANNELS, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP
+from .options import AIR, CHANNELS, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP, air_of, names_of
 
 
 def external_torque(
@@ -46,5 +46,14 @@ def external_torque(
 
     job = Job(context)
     turn = None if turn_rate is None else numbers(turn_rate, "rad/s", 3)
-    result = steady_torque(job.telemetry(), job.craft, method=method, variant=variant, frame=frame, turn_rad_s=turn, known=names_of(known) or (), air=air_of(air))
+    result = steady_torque(
+        job.telemetry(),
+        job.craft,
+        method=method,
+        variant=variant,
+        frame=frame,
+        turn_rad_s=turn,
+        known=names_of(known) or (),
+        air=air_of(air),
+    )
     job.finish(result, options={"method": result.method})

@@ -383,3 +383,22 @@ def test_the_verb_refuses(words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     saved(held(TOTAL), tmp_path)
     complaint("external-torque", "t.csv", *words)
+
+
+def test_law_known_torques_that_are_taken_off_leave_nothing(tmp_path):
+    from orbiter import drawn, fly
+
+    from asflown.craft.surroundings import Magnetics
+
+    flight = drawn(3, sunlight=np.zeros(3), drag=np.zeros(3))
+    tlm, craft, _ = fly(flight)
+    dipole = Magnetics(residual_dipole=" ".join(map(str, flight.dipole)) + " A m2", sigma="0.01 A m2")
+    craft = craft.model_copy(update={"magnetics": dipole})
+    whole = external_torque(tlm, craft)
+    left = external_torque(tlm, craft, known=("gravity-gradient", "dipole"))
+    assert set(left.known) == {"gravity-gradient", "dipole"} and not whole.known
+    assert np.linalg.norm(left.torque_Nm) < 0.1 * np.linalg.norm(whole.torque_Nm)
+    assert np.all(np.abs(left.torque_Nm) < 3 * np.hypot(left.torque_sigma_Nm, left.torque_systematic_Nm))
+    assert np.all(left.torque_systematic_Nm > whole.torque_systematic_Nm)
+    with pytest.raises(BadInput, match="aerodynamics"):
+        external_torque(tlm, craft, known=("drag",))

@@ -30,6 +30,7 @@ from ...kit.rotations import rotation
 from ...kit.timeline import NS
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
+from ..environment import known_terms
 from ..subject import (
     FEWEST,
     GYRO_BIAS,
@@ -46,8 +47,11 @@ from .regress import OUTLYING, Fit, regress
 from .result import ExternalTorqueResult
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ...craft.model import Craft
     from ...telemetry.telemetry import Telemetry
+    from ..environment import Air
 
 METHODS = ("drift", "momentum")
 VARIANTS = ("corrected", "printed")
@@ -163,6 +167,8 @@ def external_torque(
         )
     turning = subject.slewing or _turns_far(telemetry)
     method = method or ("momentum" if frame == "inertial" or (turning and variant == "corrected") else "drift")
+    if known and variant == "printed":
+        raise BadInput("the printed variant takes no known torques off", remedy="Use --variant corrected.")
     if method == "momentum" and (variant == "printed" or turn_rad_s is not None):
         raise BadInput(
             "the momentum method has no printed variant and takes the turn from the attitude",
@@ -278,7 +284,7 @@ class _Taken:
         around = known_terms(self.subject, s.tai_ns, self.names, self.air)
         self.doubts = around.doubts
         self.where_from = {t.name: t.source for t in around.terms}
-        torque = np.sum([t.torque_Nm for t in around.terms], axis=0)
+        torque = np.sum([t.torque_Nm for t in around.terms if t.torque_Nm is not None], axis=0)
         errors = [t.errors_Nm for t in around.terms if t.errors_Nm is not None]
         R = turned.as_matrix()
         whole = np.concatenate([torque[:, :, None], *errors], axis=2)
