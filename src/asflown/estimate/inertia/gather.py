@@ -77,6 +77,7 @@ TILTED = Kind(
 
 def slew_record(subject: Subject) -> SlewRecord:
     """Raises BadInput where wheels, or both of rates and attitude, are missing, and where nothing usable is left."""
+    check_wheels(subject)
     reader = _Reader(subject)
     rates, attitude = reader.rates(), reader.attitude()
     _check_motion(subject.telemetry, rates, attitude)
@@ -106,6 +107,17 @@ def slew_record(subject: Subject) -> SlewRecord:
         axes=held.axes, spins=held.spins, relative=subject.relative, counts=counts, doubts=Doubts(found),
     )  # fmt: skip
     return with_orbit(made, subject.telemetry, reader.start_ns, subject.inertia_kgm2)
+
+
+def check_wheels(subject: Subject) -> None:
+    """Raises BadInput for a craft that has no wheels, and whose telemetry has no momentum either."""
+    name = subject.craft.craft.name
+    if not subject.craft.craft.wheels and not subject.telemetry.has_axes("wheel_momentum"):
+        raise BadInput(
+            f"{name} has no wheels, and it is the momentum that wheels hold which tells the inertia",
+            file=subject.telemetry.source or None,
+            remedy="Describe them as [[wheels]] in the craft file, or add wheel_momentum_x, _y, _z.",
+        )
 
 
 def _check_motion(tlm: Telemetry, rates: RateSamples, attitude: AttitudeSamples) -> None:

@@ -34,6 +34,7 @@ from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
 from ..subject import subject_of
 from .excitation import excitation, named, normal_matrix
+from .gather import check_wheels
 from .prior import PRODUCT_SHARE, prior_sigma
 from .tensor import whole_motion_of
 
@@ -321,6 +322,7 @@ def _begun(craft: Craft, telemetry: Telemetry | None, date: str | None) -> tuple
         now = craft.at(None if date is None else int(utc_to_tai_ns(date)))
         return now, _Flown(), now.doubts
     subject = subject_of(telemetry, craft)
+    check_wheels(subject)
     flown = _flown_in(subject)
     if excitation(flown.omega_B, flown.rate_sigma).rank == 0:
         return subject.craft, flown, subject.doubts

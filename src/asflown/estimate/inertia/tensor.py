@@ -58,7 +58,8 @@ NOT_IDENTIFIED = Kind(
 )  # fmt: skip
 SLOW_BY_SAMPLES = Kind(
     "inertia.slow-by-samples", Severity.SUSPECT,
-    "a slow outside torque acts, and method {method} {lacks}: its sigma is too small",
+    "slow outside torques act, and method {method} does not know of them: against method gls, which does, they move its elements by up to "
+    "{off:.2g} ({element})",
     "Use --method consistent.",
 )  # fmt: skip
 
@@ -174,10 +175,6 @@ def _by_samples(subject: Subject, record: SlewRecord, method: str, frame: str) -
         solved = generalized(rows, levels, record.momentum.unit_covariance(), frame)
     else:
         solved = by_axis(rows, slews) if method == "axis" else all_axes(rows, slews)
-    slow = None
-    if record.slow:
-        lacks = "has its levers only, and white noise" if method == "gls" else "does not know of it"
-        slow = SLOW_BY_SAMPLES(method=method, lacks=lacks)
     omega = rows.motion.omega_B[solved.used]
     excited = excitation(omega if len(omega) else rows.motion.omega_B)
     if method == "axis":
@@ -198,8 +195,17 @@ def _by_samples(subject: Subject, record: SlewRecord, method: str, frame: str) -
         slews=tuple(replace(s, start_s=record.zero_s + s.start_s, stop_s=record.zero_s + s.stop_s) for s in slews),
         evidence=_evidence(record, rows, solved),
         products=solved.products,
-        doubts=[*record.doubts, *doubts, slow],
+        doubts=[*record.doubts, *doubts, _slow_doubt(record, rows, method, elements, frame)],
     )
+
+
+def _slow_doubt(record: SlewRecord, rows: Rows, method: str, elements: np.ndarray, frame: str) -> Doubt | None:
+    """What slow outside torques do to the elements (6,) of a method without them."""
+    if not record.slow or method == "gls":
+        return None
+    known = generalized(rows, first_levels(record), record.momentum.unit_covariance(), frame).elements
+    off = np.nan_to_num(np.abs(elements - known))
+    return SLOW_BY_SAMPLES(method=method, off=float(off.max()), element=ELEMENTS[int(np.argmax(off))])
 
 
 def _axis_doubts(slews: list[Slew], elements: np.ndarray) -> list[Doubt]:

@@ -45,28 +45,28 @@ _FEWEST, _MOST = 8, 240
 _NONE = 0.1
 
 FIELD_SIZE = Kind(
-    "sky.field-size", Severity.SUSPECT,
+    "subject.field-size", Severity.SUSPECT,
     "the measured magnetic field is {ratio:.3g} times as strong as IGRF's at the orbit's position (median){guess}",
     "Check the unit of magnetic_field, and that of the positions.",
 )  # fmt: skip
 FIELD_APART = Kind(
-    "sky.field-apart", Severity.SUSPECT,
+    "subject.field-apart", Severity.SUSPECT,
     "the measured magnetic field stands {off_deg:.0f} degrees from IGRF's at the orbit's position and attitude (median): {how}",
     "Give magnetic_field_x, _y, _z in the craft's body axes; check the epoch and the quaternion.",
 )  # fmt: skip
 SUN_APART = Kind(
-    "sky.sun-apart", Severity.SUSPECT,
+    "subject.sun-apart", Severity.SUSPECT,
     "the measured Sun stands {off_deg:.0f} degrees from where it is on that date and in that attitude (median): {how}",
     "Give sun_direction_x, _y, _z in the craft's body axes; check the epoch and the quaternion.",
 )  # fmt: skip
 ATTITUDE_APART = Kind(
-    "sky.attitude-apart", Severity.SUSPECT,
+    "subject.attitude-apart", Severity.SUSPECT,
     "field and Sun both stand elsewhere than date, orbit and attitude say ({field_deg:.0f} and {sun_deg:.0f} degrees, medians), and both fit "
     "{how}",
     "Give the quaternion body to inertial, of the same body axes as the vectors.",
 )  # fmt: skip
 SHADOW_APART = Kind(
-    "sky.shadow-apart", Severity.SUSPECT,
+    "subject.shadow-apart", Severity.SUSPECT,
     "the sun sensor's shadow is not the Earth's: {dark_s:.0f} s dark where orbit and date give light, {light_s:.0f} s light where they give "
     "shadow. The sensor is believed",
     "Check orbit_position and the epoch; a sun vector of zero must mean shadow, not a Sun outside the sensor's view.",

@@ -2,13 +2,15 @@
 
 From sample to sample, with the way of turning s = sign(w):
 
-    s (integral of torque - J change of w) = coulomb dt + viscous (integral of |w|) + s zero dt + error
+    s (integral of torque - J change of w) = coulomb dt + viscous (integral of |w|) + s (zero dt + delay (change of torque)) + error
 
 What the motor does between samples of its torque makes errors that are independent from step to step; noise of the rate, and
 of a torque whose integral takes two samples, correlates neighbours.  Both are fitted, and the law by generalised least squares.
 
 zero is what the torque reads where there is none.  Of a wheel that turns one way it cannot be told from Coulomb drag: what is
 known of it beforehand, from coasts (where the motor is off, and the current reads its zero) or else assumed, is a prior.
+delay is how much later the torque acts than it is read, half a control cycle or so: it is nothing over a whole record, but without
+it the steps in which the torque jumps would be left out, and what the others are off with it.
 """
 
 from __future__ import annotations
@@ -47,13 +49,14 @@ class Steps:
     """Steps of a wheel in which it turns one way, clear of stiction, and its motor's torque is known; all (N,).
 
     ``way``: sign of the rate; ``turned``: integral of |rate|; ``lost``: torque's integral less momentum gained, in the way of
-    turning; ``gained``: momentum gained, in the way of turning; ``joined``: whether the next step begins where this one ends."""
+    turning; ``gained``: momentum gained, in the way of turning; ``jump``: change of the torque, in the way of turning; ``joined``: whether the next step begins where this one ends."""
 
     dt: np.ndarray
     way: np.ndarray
     turned: np.ndarray
     lost: np.ndarray
     gained: np.ndarray
+    jump: np.ndarray
     joined: np.ndarray
 
 
@@ -116,10 +119,11 @@ def steps_of(finder: Finder, t, torque, J: float, coasts: list[tuple[float, floa
         integral = np.interp(b, t, whole) - np.interp(a, t, whole)
         turned = np.interp(b, finder.t[s], _turned(finder, s)) - np.interp(a, finder.t[s], _turned(finder, s))
         joined = np.append(np.diff(k) == 1, False)[: len(k)]
-        parts.append((b - a, way, turned, way * (integral - gained), way * gained, joined, k))
+        jump = np.interp(b, t, torque) - np.interp(a, t, torque)
+        parts.append([x[k] for x in (b - a, way, turned, way * (integral - gained), way * gained, way * jump)] + [joined])
     if not parts:
         return None
-    columns = [np.concatenate([p[c] if c == 5 else p[c][p[6]] for p in parts]) for c in range(6)]
+    columns = [np.concatenate(c) for c in zip(*parts, strict=True)]
     return Steps(*columns) if len(columns[0]) >= _FEWEST else None
 
 
@@ -131,8 +135,10 @@ def _turned(finder: Finder, s: slice) -> np.ndarray:
 
 def motor_law(steps: Steps, zero: tuple[float, float]) -> MotorLaw | None:
     """The law of drag; None where the steps do not tell it.  ``zero``: of the torque and its sigma, known beforehand [N m]."""
-    X = np.column_stack([steps.dt, steps.turned, steps.way * steps.dt])
+    X = np.column_stack([steps.dt, steps.turned, steps.way * steps.dt, steps.jump])
     size = np.linalg.norm(X, axis=0)
+    if size[3] == 0:  # a torque that never changes has no delay
+        X, size = X[:, :3], size[:3]
     kept = np.ones(len(X), bool)
     for _ in range(4):
         A, y, errors = _generalised(X / size, steps, kept)
