@@ -38,7 +38,7 @@ def abilities(craft: Craft) -> tuple[Ability, ...]:
     drag = "" if craft.aerodynamics else "no [aerodynamics]: needs --area and --arm"
     return (
         _ability("torque", no_inertia, inertia, no_wheels, loop),
-        _ability("wheels", "" if craft.wheels else "no [[wheels]]"),
+        _ability("wheels", "" if craft.wheels else "no [[wheels]]", _spin_note(craft), _motor_note(craft)),
         _ability("inertia", "" if craft.wheels else "no [[wheels]]", _spin_note(craft)),
         _ability("external-torque", no_inertia, inertia, no_wheels),
         _ability("density", no_inertia, inertia, drag),
@@ -61,3 +61,8 @@ def _inertia_note(craft: Craft) -> str:
 
 def _spin_note(craft: Craft) -> str:
     return "spin inertia unknown: answers per unit of it" if any(w.spin_inertia is None for w in craft.wheels) else ""
+
+
+def _motor_note(craft: Craft) -> str:
+    named = any(w.torque_constant is not None for w in craft.wheels)
+    return "" if named else "no torque_constant: wheel currents are not used"
