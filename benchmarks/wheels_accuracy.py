@@ -60,7 +60,9 @@ def telemetry_of(columns: dict, epoch_ns: int = EPOCH) -> Telemetry:
     channels = {}
     for name, (t, values, count) in columns.items():
         at = np.rint(np.asarray(t) * NS).astype(np.int64) + epoch_ns
-        channels[name] = Channel(name, at, np.asarray(values), np.ones(len(at), bool), kind_of(name).unit, count_size=count)
+        channels[name] = Channel(
+            name, at, np.asarray(values), np.ones(len(at), bool), kind_of(name).unit, count_size=count
+        )
     return Telemetry(channels, epoch_ns)
 
 
@@ -76,7 +78,10 @@ def drawn_axes(rng, n: int) -> np.ndarray:
 def craft_of(names, axes, J: float, I_B=None) -> Craft:
     made = tuple(
         Wheel(
-            name=n, axis=" ".join(f"{x:.9f}" for x in a), spin_inertia=f"{J:.12g} kg m2", torque_constant=f"{CONSTANT} N m/A"
+            name=n,
+            axis=" ".join(f"{x:.9f}" for x in a),
+            spin_inertia=f"{J:.12g} kg m2",
+            torque_constant=f"{CONSTANT} N m/A",
         )
         for n, a in zip(names, axes, strict=True)
     )
@@ -121,7 +126,11 @@ def fly(seed: int, n: int, *, motion: float = 0.0, current: bool = False, names=
         columns[f"wheel_rate_{name}"] = (ts, np.round(told / count) * count if count else told, count)
         if current:
             scale = float(np.quantile(np.abs(torque[:, k]), 0.999))
-            read = torque[::cadence, k] + 0.01 * scale * rng.standard_normal() + 0.02 * scale * rng.standard_normal(len(ts))
+            read = (
+                torque[::cadence, k]
+                + 0.01 * scale * rng.standard_normal()
+                + 0.02 * scale * rng.standard_normal(len(ts))
+            )
             columns[f"wheel_current_{name}"] = (ts, read / CONSTANT, 0.0)
     gyro = 10 ** rng.uniform(-6.3, -5.0)
     for j, a in enumerate("xyz"):
@@ -138,7 +147,9 @@ def _held(rng, t, axes, J, I_B, first, coulomb, viscous, coasting, motion):
     pull = 2 * np.pi * rng.uniform(0.01, 0.03)
     noises = rng.standard_normal((len(t), 3)) * 10 ** rng.uniform(-5.5, -4.5)
     steady = 0.02 * float(np.mean(coulomb)) * rng.standard_normal(3)
-    command = motion * J / float(np.max(I_B)) * np.array([np.sin(2 * np.pi * t / p) for p in rng.uniform(150, 400, 3)]).T
+    command = (
+        motion * J / float(np.max(I_B)) * np.array([np.sin(2 * np.pi * t / p) for p in rng.uniform(150, 400, 3)]).T
+    )
     ahead = np.gradient(command, STEP, axis=0)
     shares = {}
     rates, bodies, motors = np.empty((len(t), n)), np.empty((len(t), 3)), np.empty((len(t), n))
@@ -253,7 +264,9 @@ def judged(job) -> tuple[bool, bool, bool, bool]:
 
 
 def months(count: int, seed: int) -> None:
-    print("| days | growth of W1 | temperature lasts | months | any trend | a trend of W1 | of another wheel | newest deviates |")
+    print(
+        "| days | growth of W1 | temperature lasts | months | any trend | a trend of W1 | of another wheel | newest deviates |"
+    )
     print("|---|---|---|---|---|---|---|---|")
     with ProcessPoolExecutor(2) as pool:
         for days, grown, lasting in ((8, 0.0, 0.0), (8, 0.25, 0.0), (8, 0.0, 0.7), (8, 0.05, 0.0)):

@@ -40,7 +40,7 @@ def abilities(craft: Craft) -> tuple[Ability, ...]:
     known = _known_note(craft)
     return (
         _ability("torque", no_inertia, inertia, no_wheels, loop, known),
-        _ability("wheels", "" if craft.wheels else "no [[wheels]]"),
+        _ability("wheels", "" if craft.wheels else "no [[wheels]]", _spin_note(craft), _motor_note(craft)),
         _ability("inertia", "" if craft.wheels else "no [[wheels]]", _spin_note(craft)),
         _ability("external-torque", no_inertia, inertia, no_wheels, known),
         _ability("sources", no_inertia, inertia, no_wheels, orbit, _not_described(craft)),
@@ -87,3 +87,8 @@ def _not_described(craft: Craft) -> str:
         ) if not there
     ]  # fmt: skip
     return f"no {', '.join(missing)}: fitted from the telemetry alone" if missing else ""
+
+
+def _motor_note(craft: Craft) -> str:
+    named = any(w.torque_constant is not None for w in craft.wheels)
+    return "" if named else "no torque_constant: wheel currents are not used"

@@ -120,7 +120,9 @@ def steps_of(finder: Finder, t, torque, J: float, coasts: list[tuple[float, floa
         turned = np.interp(b, finder.t[s], _turned(finder, s)) - np.interp(a, finder.t[s], _turned(finder, s))
         joined = np.append(np.diff(k) == 1, False)[: len(k)]
         jump = np.interp(b, t, torque) - np.interp(a, t, torque)
-        parts.append([x[k] for x in (b - a, way, turned, way * (integral - gained), way * gained, way * jump)] + [joined])
+        parts.append(
+            [x[k] for x in (b - a, way, turned, way * (integral - gained), way * gained, way * jump)] + [joined]
+        )
     if not parts:
         return None
     columns = [np.concatenate(c) for c in zip(*parts, strict=True)]

@@ -34,7 +34,13 @@ def reversed_wheels(record: RecordedWheels) -> list[Doubt]:
     """A doubt where the body's motion fits wheels of which some are reversed, and not the wheels as described."""
     I_B, wheels, tlm = record.now.inertia_kgm2, record.now.wheels, record.telemetry
     names = [w.name for w in wheels]
-    if I_B is None or not names or len(names) > _MOST or not tlm.has_axes("body_rate") or not set(names) <= set(record.finders):
+    if (
+        I_B is None
+        or not names
+        or len(names) > _MOST
+        or not tlm.has_axes("body_rate")
+        or not set(names) <= set(record.finders)
+    ):
         return []
     channels = [f"body_rate_{a}" for a in AXES] + [f"wheel_rate_{n}" for n in names]
     means, length = _in_blocks(record, channels)
