@@ -8,7 +8,18 @@ import typer
 
 from .job import Job
 from .options import (
-    AIR, CHANNELS, CRAFT, EXCLUDE, INERTIA, JSON, KEEP_AS, KEEP_IN, START, STOP, air_of, names_of,
+    AIR,
+    CHANNELS,
+    CRAFT,
+    EXCLUDE,
+    INERTIA,
+    JSON,
+    KEEP_AS,
+    KEEP_IN,
+    START,
+    STOP,
+    air_of,
+    names_of,
 )  # fmt: skip
 
 
