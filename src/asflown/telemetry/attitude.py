@@ -17,8 +17,8 @@ from ..kit.errors import BadInput
 from ..kit.rotations import rates_between
 from ..kit.timeline import NS
 from .channels import AXES
-from .findings import ERROR_TOO_FAST, NEVER_TOGETHER, RATE_SCALE, TURNS_TOO_LITTLE
 from .frames import against_rates, commanded_doubt, readings_of
+from .findings import ERROR_TOO_FAST, NEVER_TOGETHER, RATE_SCALE, TURNS_TOO_LITTLE
 from .telemetry import BRIDGED, Telemetry
 
 if TYPE_CHECKING:
