@@ -65,7 +65,12 @@ def _flown(torque, inertia, h, gyro, star, kp, kd, turn, dt, cycle, every):
                 u[j] = hold[j] * (kp * kd * e[j] - kd * (seen[j] - w_c[j]))
             u = u + _cross(w_c, hold * w_c + h)
         if k % every == 0:
-            out[k // every, :3], out[k // every, 3:6], out[k // every, 6:9], out[k // every, 9:] = theta, w, h, torque[k]
+            out[k // every, :3], out[k // every, 3:6], out[k // every, 6:9], out[k // every, 9:] = (
+                theta,
+                w,
+                h,
+                torque[k],
+            )
         half = w + 0.5 * dt * inverse @ (torque[k] + u - _cross(w, inertia @ w + h))
         w = w + dt * inverse @ (torque[k] + u - _cross(half, inertia @ half + h - 0.5 * dt * u))
         h = h - dt * u
@@ -76,7 +81,8 @@ def _flown(torque, inertia, h, gyro, star, kp, kd, turn, dt, cycle, every):
 def torques(time_s, rng) -> tuple[np.ndarray, np.ndarray]:
     """A slow torque (N, 3) at the orbit's harmonics, two shadow edges and two steps; times of all edges."""
     slow = sum(
-        rng.normal(0, 1.5e-5 / k, 3) * np.cos(k * TURN * time_s[:, None] + rng.uniform(0, 2 * np.pi, 3)) for k in (0.5, 1, 2)
+        rng.normal(0, 1.5e-5 / k, 3) * np.cos(k * TURN * time_s[:, None] + rng.uniform(0, 2 * np.pi, 3))
+        for k in (0.5, 1, 2)
     )
     end = time_s[-1]
     at = np.sort(rng.uniform(0.08, 0.92, 2) * end)
@@ -101,11 +107,27 @@ def flight(seed: int, minutes: float):
         slow[k] = keep * slow[k - 1] + walk[k]
     star = noise * (slow + STAR_WHITE * rng.standard_normal((cycles, 3)))
     w = 2 * np.pi * BANDWIDTH_HZ
-    out = _flown(torque, INERTIA, SPIN_INERTIA * SPEEDS @ AXES, gyro, star, w / (2 * DAMPING), 2 * DAMPING * w, TURN, STEP_S, cycle, every)
+    out = _flown(
+        torque,
+        INERTIA,
+        SPIN_INERTIA * SPEEDS @ AXES,
+        gyro,
+        star,
+        w / (2 * DAMPING),
+        2 * DAMPING * w,
+        TURN,
+        STEP_S,
+        cycle,
+        every,
+    )
     theta, rate, h, true = out[:, :3], out[:, 3:6], out[:, 6:9], out[:, 9:]
     sampled = slice(None, None, every // cycle)
     speeds = SPEEDS + (h - h[0]) @ np.linalg.pinv(SPIN_INERTIA * AXES)
-    return telemetry(at[::every], speeds, rate + gyro[sampled], theta + star[sampled]), believed(rng), (at[::every], true, edges)
+    return (
+        telemetry(at[::every], speeds, rate + gyro[sampled], theta + star[sampled]),
+        believed(rng),
+        (at[::every], true, edges),
+    )
 
 
 def telemetry(time_s, speeds, rate, theta) -> Telemetry:
@@ -118,7 +140,9 @@ def telemetry(time_s, speeds, rate, theta) -> Telemetry:
     columns |= {f"quaternion_{m}": q[:, j] for j, m in enumerate("xyzw")}
     tai_ns = 820_000_000 * NS + np.round(time_s * 1e3).astype(np.int64) * 1_000_000
     counts = {n: SPEED_COUNT for n in columns if n.startswith("wheel")}
-    channels = {n: Channel(n, tai_ns, v, np.ones(len(v), bool), kind_of(n).unit, counts.get(n, 0.0)) for n, v in columns.items()}
+    channels = {
+        n: Channel(n, tai_ns, v, np.ones(len(v), bool), kind_of(n).unit, counts.get(n, 0.0)) for n, v in columns.items()
+    }
     return Telemetry(channels, int(tai_ns[0]))
 
 

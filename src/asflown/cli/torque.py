@@ -86,7 +86,13 @@ def torque(
     # seconds for an event, minutes for an orbit at 1 Hz: say that something happens, to a terminal only
     with Console(stderr=True).status("fitting and smoothing", spinner="line"):
         result = torque_by(
-            telemetry, craft_then, method=chosen, axis=axis, moving=mechanism, known=names_of(known) or (), air=air_of(air)
+            telemetry,
+            craft_then,
+            method=chosen,
+            axis=axis,
+            moving=mechanism,
+            known=names_of(known) or (),
+            air=air_of(air),
         )
     if impulse is not None:
         result = _with_impulse(result, impulse)

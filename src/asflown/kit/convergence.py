@@ -59,7 +59,7 @@ def _r_hat(chains: np.ndarray) -> float:
 def _effective(chains: np.ndarray) -> float:
     """Number of independent draws that tell the mean as well; Geyer's initial monotone sequence of the correlations."""
     chains = chains.astype(float)
-    count, n = chains.shape
+    n = chains.shape[1]
     if np.ptp(chains) == 0:
         return float(chains.size)
     correlated = _autocovariance(chains).mean(axis=0)

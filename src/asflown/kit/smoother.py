@@ -164,9 +164,7 @@ def score(model: Model, data: Measurements) -> Score:
     arrays = _arrays(model, data)
     ll, mean, covariances, innovation, variance, product, origin = _filter(*arrays, True)
     A, _, _, _, which, H, R, _, _, start, row, _, period, _ = arrays
-    found = _slopes(
-        A, which, H, len(R), start, row, period, mean, covariances, innovation, variance, product, origin
-    )
+    found = _slopes(A, which, H, len(R), start, row, period, mean, covariances, innovation, variance, product, origin)
     return Score(float(ll), *found)
 
 

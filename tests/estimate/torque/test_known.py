@@ -7,11 +7,11 @@ import asflown
 import leo
 from asflown.kit.errors import BadInput
 
-DIPOLE = '''
+DIPOLE = """
 [magnetics]
 residual_dipole = "0.3 -0.2 0.3 A m2"
 sigma = "0.05 A m2"
-'''
+"""
 
 
 def test_law_what_is_taken_off_is_in_the_result_and_its_sigma_in_the_band(tmp_path):

@@ -110,6 +110,7 @@ def errors_from_quaternions(subject: Subject, grid: Grid) -> dict[int, Series]:
         error = attitude_error(q[:, 4:], q[:, :4])
     else:
         held = held_to_orbit(subject)
+        assert held is not None  # by has_attitudes
         tai_ns, q = together(tlm, _QUATERNION)
         inside = (tai_ns >= held.tai_ns[0]) & (tai_ns <= held.tai_ns[-1])
         tai_ns, q = tai_ns[inside], q[inside]

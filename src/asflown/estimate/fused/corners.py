@@ -147,7 +147,9 @@ class _Search:
         return cls._of(axis, bends, begin, slope**2, np.diff(at_s[:2]).repeat(len(at_s)), _CORNER_PRIOR, rng)
 
     @classmethod
-    def of_ramps(cls, axis: AxisData, at_s: np.ndarray, long_s: np.ndarray, each_s: np.ndarray, rng: Generator) -> _Search:
+    def of_ramps(
+        cls, axis: AxisData, at_s: np.ndarray, long_s: np.ndarray, each_s: np.ndarray, rng: Generator
+    ) -> _Search:
         """Ramps about some instants, of some lengths, to a step of one; ``each_s``: the time that each stands for."""
         t = axis.times.seconds
         ramps = np.clip((t[:, None] - at_s) / long_s + 0.5, 0.0, 1.0)
@@ -293,7 +295,7 @@ def _ramps(found: Suspects, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray,
                 rows += [(round(x / step) * step, length, spacing) for x in here if wanted[0] < x < wanted[-1]]
     coarse = np.ptp(wanted) / _COARSE
     rows += [(x, _RAMPS_S[-1], coarse) for x in np.arange(wanted[0] + coarse / 2, wanted[-1], coarse)]
-    finest = {}  # of those that coincide
+    finest: dict[tuple[float, float], float] = {}  # of those that coincide
     for at, length, spacing in rows:
         finest[at, length] = min(spacing, finest.get((at, length), np.inf))
     at, length, each = np.array([(*k, v) for k, v in sorted(finest.items())]).T
@@ -332,7 +334,10 @@ def _walked(
         )  # fmt: skip
         usual = int(np.bincount(drawn.which).argmax())
         left = own[usual] - ways[usual].columns @ drawn.bends[drawn.which == usual].mean(axis=0)
-        explained = bool(np.mean(left**2) < max(1, np.mean(own[-1] ** 2)) + _UNEXPLAINED * math.sqrt(2 / len(left)))
+        usually = (
+            max(1.0, float(np.mean(own[0] ** 2))) if ways[0].rough else 1.0
+        )  # a smooth torque's own, where it is the first
+        explained = bool(np.mean(left**2) < usually + _UNEXPLAINED * math.sqrt(2 / len(left)))
         if explained and met.r_hat < apart:
             break
     return _Found(drawn, left, explained, met)

@@ -362,7 +362,8 @@ def _solve(
         raise _not_fitted()
     innovations = by_channel(post.whitened, axis.channel)
     off = {
-        n: (s * float(c.mean()), s * float(c.std())) for (n, s), c in zip(sizes.items(), post.considered.T, strict=False)
+        n: (s * float(c.mean()), s * float(c.std()))
+        for (n, s), c in zip(sizes.items(), post.considered.T, strict=False)
     }
     unexplained = innovation_doubts(name, innovations)
     doubts += unexplained + considered_doubts(name, sizes, post.considered) + _apart(name, post.settings)
@@ -380,7 +381,9 @@ def _apart(name: str, found: dict) -> list[Doubt]:
     return [CHAINS_APART(axis=name, r_hat=found["r_hat"], draws=draws)]
 
 
-def _sensitivities(whole: AxisData, axis: AxisData, considered: dict[str, float]) -> tuple[dict[str, float], np.ndarray]:
+def _sensitivities(
+    whole: AxisData, axis: AxisData, considered: dict[str, float]
+) -> tuple[dict[str, float], np.ndarray]:
     """Sigmas by name, and sensitivities (M, P) of one sigma each, of what is taken as known and moves these measurements.
 
     ``axis``: less the coupling, ``whole``: with it.  The wheels' scale is in w x H as in their momentum: it counts by the torque alone."""

@@ -9,12 +9,15 @@ fitted anew with the torque free to move at the surest edges, and the instants a
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import optimize
 
 from ...kit.smoother import Model, log_likelihood, score
-from .body import AxisData, Levels
+
+if TYPE_CHECKING:
+    from .body import AxisData, Levels
 
 #: An instant may be an edge, about which the torque is free while its levels are fitted; it is a suspect, near which corners are
 #: looked for. [sigma]
@@ -70,7 +73,9 @@ def _model(axis: AxisData, levels: Levels, edges: np.ndarray) -> Model:
 def _kicks(axis: AxisData, levels: Levels, edges: np.ndarray, apart_s: float) -> tuple[np.ndarray, np.ndarray]:
     """Instants of the suspects away from the edges and how sure each is, none this near a surer one."""
     at = axis.times.seconds
-    kick = np.abs(score(_model(axis, levels, edges), axis.data).kick[:, [axis.body.torque, axis.body.slope]]).max(axis=1)
+    kick = np.abs(score(_model(axis, levels, edges), axis.data).kick[:, [axis.body.torque, axis.body.slope]]).max(
+        axis=1
+    )
     for t in edges:
         kick[np.abs(at - t) <= NEAR_S] = 0.0
     kick[np.minimum(at - at[0], at[-1] - at) < NEAR_S] = 0.0  # the start is free as it is, and the end nearly so

@@ -43,21 +43,29 @@ def check_known(names) -> tuple[str, ...]:
     return tuple(n for n in NAMES if n in names)
 
 
-def without_known(result: TorqueResult, subject: Subject, names: tuple[str, ...], air: Air | None = None) -> TorqueResult:
+def without_known(
+    result: TorqueResult, subject: Subject, names: tuple[str, ...], air: Air | None = None
+) -> TorqueResult:
     """The result less some torques of the surroundings, whose uncertainty goes into its sigma and its drawn torques.
 
     Raises BadInput where one of them cannot be computed."""
     tai_ns = subject.telemetry.epoch_ns + np.round(result.time_s * NS).astype(np.int64)
     environment = environment_of(subject, tai_ns, names, air)
     missing = [f"{name} needs {what}" for name, what in environment.left_out.items()]
-    missing += [f"{t.name} needs {_BELIEFS[t.name]} in the craft file" for t in environment.terms if t.torque_Nm is None]
+    missing += [
+        f"{t.name} needs {_BELIEFS[t.name]} in the craft file" for t in environment.terms if t.torque_Nm is None
+    ]
     if missing:
-        raise BadInput(f"not all known torques can be computed: {some_of(missing)}", remedy="Leave these out of --with.")
+        raise BadInput(
+            f"not all known torques can be computed: {some_of(missing)}", remedy="Leave these out of --with."
+        )
     terms = environment.terms
-    total = np.sum([t.torque_Nm for t in terms], axis=0)
-    errors = np.concatenate([t.errors_Nm for t in terms if t.errors_Nm is not None], axis=2)
     known = tuple(KnownTorque(t.name, t.source, t.torque_Nm, t.sigma_Nm) for t in terms)  # type: ignore[arg-type]
-    changed = replace(result, torque_Nm=result.torque_Nm - total, known=known, doubts=result.doubts + environment.doubts)
+    total = np.sum([k.torque_Nm for k in known], axis=0)
+    errors = np.concatenate([t.errors_Nm for t in terms if t.errors_Nm is not None], axis=2)
+    changed = replace(
+        result, torque_Nm=result.torque_Nm - total, known=known, doubts=result.doubts + environment.doubts
+    )
     if result.torque_sigma_Nm is not None:
         sigma = np.sqrt(result.torque_sigma_Nm**2 + np.sum(errors**2, axis=2))
         changed = replace(changed, torque_sigma_Nm=sigma)
@@ -73,5 +81,7 @@ def _paths(result: TorqueResult, total: np.ndarray, errors: np.ndarray) -> np.nd
     def fitted(values):
         return values if len(fine) == len(at) else np.column_stack([np.interp(fine, at, v) for v in values.T])
 
-    taken = fitted(total) + np.einsum("kq,fjq->kfj", off, np.stack([fitted(e) for e in np.moveaxis(errors, 2, 0)], axis=2))
+    taken = fitted(total) + np.einsum(
+        "kq,fjq->kfj", off, np.stack([fitted(e) for e in np.moveaxis(errors, 2, 0)], axis=2)
+    )
     return paths - taken
