@@ -20,6 +20,7 @@ from ...telemetry.channels import AXES
 from .gravity import with_orbit
 from .record import AttitudeSamples, MomentumSamples, RateSamples, SlewRecord
 from .slews import find_slews
+from .swings import swings_of
 
 if TYPE_CHECKING:
     from ...craft.model import Wheel
@@ -104,7 +105,7 @@ def slew_record(subject: Subject) -> SlewRecord:
     counts = {stem: _count(subject.telemetry, stem) for stem in ("wheel_rate", "body_rate", "quaternion")}
     made = SlewRecord(
         zero_s=reader.zero_s, momentum=momentum, rates=rates, attitude=attitude, arcs=tuple(arcs), wheels=held.names,
-        axes=held.axes, spins=held.spins, relative=subject.relative, counts=counts, doubts=Doubts(found),
+        axes=held.axes, spins=held.spins, swings=() if subject.relative else swings_of(subject.craft), relative=subject.relative, counts=counts, doubts=Doubts(found),
     )  # fmt: skip
     return with_orbit(made, subject.telemetry, reader.start_ns, subject.inertia_kgm2)
 
