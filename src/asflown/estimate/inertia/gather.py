@@ -148,7 +148,10 @@ def _tilted(rates: RateSamples, attitude: AttitudeSamples) -> Doubt | None:
     parts = [(rates.time_s[rates.axis == j], rates.value_rad_s[rates.axis == j]) for j in range(3)]
     gyro = np.stack([np.interp(mid, t, v) for t, v in parts], axis=1)
     r, g = (np.array([p.mean(axis=0) for p in np.array_split(x, _TILT_BLOCKS)]) for x in (rate, gyro))
-    X = np.concatenate([np.cross(np.eye(3)[None], r[:, None, :]).swapaxes(1, 2), r[:, :, None], np.tile(np.eye(3), (len(r), 1, 1))], axis=2)
+    X = np.concatenate(
+        [np.cross(np.eye(3)[None], r[:, None, :]).swapaxes(1, 2), r[:, :, None], np.tile(np.eye(3), (len(r), 1, 1))],
+        axis=2,
+    )
     X, y = X.reshape(-1, 7), (g - r).ravel()
     size = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
     inverse = np.linalg.pinv((X / size).T @ (X / size), rcond=1e-6, hermitian=True)
@@ -323,7 +326,9 @@ class _Reader:
             parts.append(part)
         fields = MomentumSamples.__annotations__
         samples = MomentumSamples(*(np.concatenate([getattr(p, f) for p in parts]) for f in fields))
-        return _Held(samples, spans, tuple(s.name for s in sources), np.array([s.per_reading for s in sources]), spins, doubts)
+        return _Held(
+            samples, spans, tuple(s.name for s in sources), np.array([s.per_reading for s in sources]), spins, doubts
+        )
 
     def wheels(self) -> list[_Source]:
         """All wheels that are in service at some time of the record."""
