@@ -1,7 +1,7 @@
 """How well the inertia tensor comes back from simulated slews: pulls, scatter against the Cramér-Rao bound, coverage.
 
-Run: python benchmarks/inertia_accuracy.py [--runs 200] [--also 60] [--others 20] [--scenario slews] [--jobs 2].
-About 3 s a fit and core.
+Run: python benchmarks/inertia_accuracy.py [--runs 200] [--also 60] [--others 20] [--scenario slews] [--jobs 2] [--orbit 0].
+About 3 s a fit and core; --orbit N: N drawn small satellites in low orbit instead (orbit_slews.py), 8 s each.
 
 Every flight is fitted by `consistent` as a user would.  The first of them are fitted twice more: with the noise levels
 known, whose covariance is the bound (the inverse Fisher information of the same model), and with both scale errors
@@ -20,6 +20,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from orbit_slews import craft_of, drawn
+from orbit_slews import flight as flown
 
 from asflown.craft.load import load_craft
 from asflown.dynamics.rigid_body import ELEMENTS, elements_of
@@ -77,6 +79,27 @@ def one(task):
     return out
 
 
+def in_orbit(task):
+    """One drawn craft in low orbit, by one method: pulls of the six elements, whether it settled, and the largest error over the moments."""
+    seed, method = task
+    made = drawn(seed)
+    result = inertia(flown(made), craft_of(made), method=method)
+    error = elements_of(result.inertia_kgm2 - made.inertia)
+    share = np.abs(error).max() / np.diag(made.inertia).mean()
+    return error / elements_of(result.inertia_sigma_random_kgm2), result.settled, share
+
+
+def report_orbit(method, found) -> None:
+    pulls = np.array([p for p, settled, _ in found if settled])
+    print(f"in low orbit, {method}: {len(found)} flights, {len(pulls)} settled" + "".join(f"{e:>9}" for e in ELEMENTS))
+    print(row("mean pull", pulls.mean(axis=0)))
+    print(row("width of the pulls", pulls.std(axis=0, ddof=1)))
+    print(row("95 % interval holds", np.mean(np.abs(pulls) < 1.96, axis=0)))
+    share = np.array([s for _, _, s in found])
+    print(f"  all elements: width {np.sqrt(np.mean(pulls**2)):.2f}, {np.mean(np.abs(pulls) < 1.96):.3f} held, largest pull {np.abs(pulls).max():.1f}; "
+          f"largest error of an element over the mean moment: median {100 * np.median(share):.4f} %, worst {100 * share.max():.4f} %", flush=True)  # fmt: skip
+
+
 def _torque(flight) -> np.ndarray:
     given = [t.torque for t in flight.scenario.torques if t.shape == "constant"]
     return np.sum(given, axis=0) if given else np.zeros(3)
@@ -115,8 +138,13 @@ def main() -> None:
     parser.add_argument("--only", help="one condition of the list")
     parser.add_argument("--scenario", default="slews")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--orbit", type=int, default=0, help="so many drawn craft in low orbit, and nothing else")
     asked = parser.parse_args()
     with ProcessPoolExecutor(asked.jobs) as pool:
+        if asked.orbit:
+            for method in ("gls", "consistent"):
+                report_orbit(method, list(pool.map(in_orbit, [(seed, method) for seed in range(asked.orbit)])))
+            return
         for name, changes in CONDITIONS.items():
             if asked.only not in (None, name):
                 continue

@@ -80,11 +80,16 @@ def drawn(seed: int, **given) -> Drawn:
 def craft_of(d: Drawn):
     """As the analyst describes it, with a tensor one per cent off."""
     rng = np.random.default_rng([d.seed, 21])
-    I = d.inertia * (1 + 0.01 * rng.standard_normal((3, 3)))
+    near = d.inertia * (1 + 0.01 * rng.standard_normal((3, 3)))
     text = ['name = "drawn"', 'description = "drawn"', "[[mass_properties]]", 'date = "2026-01-01"', 'piece = "flight"']
-    text += ['basis = "predicted"', f'inertia = "{I[0, 0]} {I[1, 1]} {I[2, 2]} {I[0, 1]} {I[0, 2]} {I[1, 2]} kg m2"', 'source = "CAD"']  # fmt: skip
+    text += ['basis = "predicted"', f'inertia = "{near[0, 0]} {near[1, 1]} {near[2, 2]} {near[0, 1]} {near[0, 2]} {near[1, 2]} kg m2"', 'source = "CAD"']  # fmt: skip
     for name, axis in zip(WHEELS, _axes(), strict=True):
-        text += ["[[wheels]]", f'name = "{name}"', f'axis = "{axis[0]} {axis[1]} {axis[2]}"', f'spin_inertia = "{d.spin} kg m2"']
+        text += [
+            "[[wheels]]",
+            f'name = "{name}"',
+            f'axis = "{axis[0]} {axis[1]} {axis[2]}"',
+            f'spin_inertia = "{d.spin} kg m2"',
+        ]
     with TemporaryDirectory() as folder:
         path = Path(folder) / "drawn.toml"
         path.write_text("\n".join(text))

@@ -19,6 +19,7 @@ from .prior import possible, prior_for
 from .result import Answer, Evidence
 from .slews import find_slews
 from .steps import momentum_step
+from .swings import SWINGS
 from .whole_motion import fit_slews
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ OUTLIERS = Kind(
     "Look at the residuals: --plot.",
 )  # fmt: skip
 NOT_CONVERGED = Kind(
-    "inertia.not-converged", Severity.CAUTION,
+    "inertia.not-converged", Severity.SUSPECT,
     "the fit did not settle in {rounds} rounds: no random sigma is given", "Take a shorter window.",
 )  # fmt: skip
 SLOW_TORQUE = Kind(
@@ -174,11 +175,19 @@ def _settings(fit: SlewFit) -> dict:
         "rates_late_sigma_s": None if late is None else sigma[late],
         "wander_Nms_per_root_s": noise.wander or None,
         "rate_bias_rad_s": None if layout.bias is None else beta[layout.bias],
+        "swings": {name: list(found) for name, found in _amplitudes(fit).items()},
         "arcs": len(fit.record.arcs),
         "left_out": int((~fit.weighted.kept).sum()),
         "rounds": fit.rounds,
         "converged": fit.converged,
     }
+
+
+def _amplitudes(fit: SlewFit) -> dict[str, tuple[float, float]]:
+    """Of what swings, over what the craft file says, with sigma."""
+    at = fit.layout.amplitudes
+    names = [s.name for s in fit.record.swings]
+    return {n: (float(b), float(s)) for n, b, s in zip(names, fit.beta[at], fit.sigma[at], strict=True)}
 
 
 def _evidence(fit: SlewFit) -> Evidence:
@@ -203,6 +212,8 @@ def _fit_doubts(fit: SlewFit) -> list[Doubt]:
         for name, k in (("wheel rates", layout.skew_wheels), ("body rates", layout.skew_rates))
         if k is not None and abs(beta[k]) > max(_LATE_S, 4 * sigma[k])
     ]
+    if fit.converged:
+        doubts += [SWINGS(name=name, share=share, sigma=s) for name, (share, s) in _amplitudes(fit).items()]
     out = int((~fit.weighted.kept).sum())
     if out:
         doubts.append(OUTLIERS(outliers=out))

@@ -20,6 +20,7 @@ from ...telemetry.channels import AXES
 from .gravity import with_orbit
 from .record import AttitudeSamples, MomentumSamples, RateSamples, SlewRecord
 from .slews import find_slews
+from .swings import swings_of
 
 if TYPE_CHECKING:
     from ...craft.model import Wheel
@@ -104,7 +105,7 @@ def slew_record(subject: Subject) -> SlewRecord:
     counts = {stem: _count(subject.telemetry, stem) for stem in ("wheel_rate", "body_rate", "quaternion")}
     made = SlewRecord(
         zero_s=reader.zero_s, momentum=momentum, rates=rates, attitude=attitude, arcs=tuple(arcs), wheels=held.names,
-        axes=held.axes, spins=held.spins, relative=subject.relative, counts=counts, doubts=Doubts(found),
+        axes=held.axes, spins=held.spins, swings=() if subject.relative else swings_of(subject.craft), relative=subject.relative, counts=counts, doubts=Doubts(found),
     )  # fmt: skip
     return with_orbit(made, subject.telemetry, reader.start_ns, subject.inertia_kgm2)
 
@@ -147,7 +148,10 @@ def _tilted(rates: RateSamples, attitude: AttitudeSamples) -> Doubt | None:
     parts = [(rates.time_s[rates.axis == j], rates.value_rad_s[rates.axis == j]) for j in range(3)]
     gyro = np.stack([np.interp(mid, t, v) for t, v in parts], axis=1)
     r, g = (np.array([p.mean(axis=0) for p in np.array_split(x, _TILT_BLOCKS)]) for x in (rate, gyro))
-    X = np.concatenate([np.cross(np.eye(3)[None], r[:, None, :]).swapaxes(1, 2), r[:, :, None], np.tile(np.eye(3), (len(r), 1, 1))], axis=2)
+    X = np.concatenate(
+        [np.cross(np.eye(3)[None], r[:, None, :]).swapaxes(1, 2), r[:, :, None], np.tile(np.eye(3), (len(r), 1, 1))],
+        axis=2,
+    )
     X, y = X.reshape(-1, 7), (g - r).ravel()
     size = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
     inverse = np.linalg.pinv((X / size).T @ (X / size), rcond=1e-6, hermitian=True)
@@ -322,7 +326,9 @@ class _Reader:
             parts.append(part)
         fields = MomentumSamples.__annotations__
         samples = MomentumSamples(*(np.concatenate([getattr(p, f) for p in parts]) for f in fields))
-        return _Held(samples, spans, tuple(s.name for s in sources), np.array([s.per_reading for s in sources]), spins, doubts)
+        return _Held(
+            samples, spans, tuple(s.name for s in sources), np.array([s.per_reading for s in sources]), spins, doubts
+        )
 
     def wheels(self) -> list[_Source]:
         """All wheels that are in service at some time of the record."""

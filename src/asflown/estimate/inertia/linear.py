@@ -234,6 +234,10 @@ def _wheel_rows(about: Reference, states: States, frame: str, seen: np.ndarray) 
     w, alpha, Rk = motion.omega_B[k], motion.alpha_B[k], R[k]
     L = np.einsum("nji,nj->ni", Rk, layout.momenta(beta)[m.arc] + added[k])  # of everything, body axes
     predicted = L - w @ I_B
+    held = np.zeros((len(k), 3, layout.swings))
+    for j, swing in enumerate(about.record.swings):
+        held[:, :, j] = swing.momentum(motion.time_s, motion.alpha_B)[k]
+    predicted = predicted - held @ beta[layout.amplitudes]
     H = np.zeros((len(k), states.size))
     H[:, :3] = np.cross(d, L)
     H[:, 3:6] = -d @ I_B
@@ -250,6 +254,7 @@ def _wheel_rows(about: Reference, states: States, frame: str, seen: np.ndarray) 
         here = m.arc == arc
         Z[here, layout.momentum(arc)] = inertial[here]
     Z[:, layout.pushes] = np.einsum("ni,nij->nj", inertial, grown[k])
+    Z[:, layout.amplitudes] = -np.einsum("ni,nij->nj", d, held)
     Z[:, layout.skew_wheels] = np.sum(d * (-np.cross(w, L) - alpha @ I_B), axis=1)
     Z[:, layout.wheel_scale] = -np.sum(d * predicted, axis=1)
     late = Z[:, layout.skew_wheels] * (beta[layout.skew_wheels] - shift)

@@ -35,6 +35,7 @@ class Layout:
     bias: slice | None
     size: int
     levers: int = 0
+    swings: int = 0  # amplitudes of what swings, the last constants
 
     TENSOR = slice(0, 6)
 
@@ -64,6 +65,11 @@ class Layout:
         return _SHIFT_S * round(both[0] / _SHIFT_S), _SHIFT_S * round(both[1] / _SHIFT_S)
 
     @property
+    def amplitudes(self) -> slice:
+        """Of what swings, over what the craft file says."""
+        return slice(self.size - self.swings, self.size)
+
+    @property
     def wheel_scale(self) -> int:
         return self.size
 
@@ -80,7 +86,8 @@ class Layout:
             skew_rates, at = at, at + 1
         if record.has_rates:
             bias, at = slice(at, at + 3), at + 3
-        return cls(len(record.arcs), skew_wheels, skew_rates, bias, at, record.levers)
+        swings = len(record.swings)
+        return cls(len(record.arcs), skew_wheels, skew_rates, bias, at + swings, record.levers, swings)
 
 
 @dataclass(frozen=True)

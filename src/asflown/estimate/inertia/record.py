@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from ...dynamics.orbit import Orbit
     from .surroundings import Surroundings
+    from .swings import Swing
 
 MOMENTUM_STEPS = Kind(
     "inertia.momentum-steps", Severity.SUSPECT,
@@ -108,7 +109,10 @@ class SlewRecord:
     relative: bool  # momentum per unit spin inertia
     counts: dict[str, float]  # one count of each kind of channel, 0 where not known
     doubts: Doubts
-    spins: tuple[np.ndarray, np.ndarray] | None = None  # instants (N,) and readings (N, n) of all wheels, where they are read together
+    spins: tuple[np.ndarray, np.ndarray] | None = (
+        None  # instants (N,) and readings (N, n) of all wheels, where they are read together
+    )
+    swings: tuple[Swing, ...] = ()
     wanders: bool = False
     slow: bool = False
     orbit: Orbit | None = None

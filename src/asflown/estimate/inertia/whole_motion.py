@@ -48,6 +48,8 @@ _LEVER_SHARE = 10.0
 #: Where the search for the slow torque starts, over the torque that is seen to act, and its time: one that starts large takes the
 #: levers' part, and hands it back in many rounds. [s]
 _SLOW_SHARE, _SLOW_S = 0.01, 1000.0
+#: One sigma of what swings, over what the craft file says of it: it may be there or not.
+_SWINGS = 1.0
 _SKEWS_TRIED = np.arange(-8.0, 8.01, 0.5)
 _MOST_ROUNDS = 20
 #: Sigmas the answer may still move by in the last round.
@@ -230,6 +232,7 @@ def prior_of_all(
             weight[k, k] = 1 / skew_s**2
     for k in range(layout.torque.stop, layout.pushes.stop):
         weight[k, k] = 1 / lever_Nm**2
+    weight[layout.amplitudes, layout.amplitudes] = np.eye(layout.swings) / _SWINGS**2
     if layout.bias is not None:
         weight[layout.bias, layout.bias] = np.eye(3) / (_BIAS if layout.skew_rates is not None else _BIAS_ALONE) ** 2
     if prior is not None:
