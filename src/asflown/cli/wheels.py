@@ -14,6 +14,7 @@ from .output import progress, say
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from ..estimate.wheels import WheelsResult
     from ..telemetry.telemetry import Telemetry
     from ..trends.entry import Entry
 
@@ -54,41 +55,52 @@ def wheels(
     from ..estimate.wheels import wheels_of_records
     from ..kit.quantities import quantity
     from ..kit.result import inputs_of
-    from ..kit.timeline import utc_label
-
-    def entries(result, telemetry):
-        from ..trends.entries import run_down_entries, wheel_entry
-
-        guessed.update(w.name for w in result.wheels if w.is_guessed)
-        if run_downs is not None:
-            return run_down_entries(result, telemetry, job.craft, name, guesses=store_guesses)
-        own = name if len(files) == 1 else f"{name or 'wheels'}-{utc_label(telemetry.span()[0])}"
-        return [wheel_entry(result, telemetry, job.craft, own, guesses=store_guesses)]
 
     job = Job(context)
     low = quantity(low_speed, "rad/s")
     named = (*(run_down or ()), *(() if run_downs is None else (str(run_downs),)))
     lists = inputs_of(*(n for n in named if n.lower().endswith(".csv")))
-    kept: list[Entry] = []
-    guessed: set[str] = set()
-
-    def done(result, telemetry):
-        if store is not None:
-            kept.extend(entries(result, telemetry))
-
+    keeping = _Entries(job)
     if len(files) == 1 and run_downs is None:
         telemetry = job.telemetry(files[0])
         result = drag_of_wheels(telemetry, job.craft, low_speed_rad_s=low, run_down=named)
-        done(result, telemetry)
+        keeping.take(result, telemetry)
     else:
         records = _each(files, job)
-        result = wheels_of_records(records, job.craft, low_speed_rad_s=low, run_down=named, each=done)
-    if guessed and not store_guesses:
-        say(
-            f"not kept, since their run-downs are only guessed: drag of {', '.join(sorted(guessed))} "
-            "(name them with --run-down, or give --store-guesses)"
-        )
-    job.finish(result, inputs=lists, entry=lambda _, __: kept)
+        result = wheels_of_records(records, job.craft, low_speed_rad_s=low, run_down=named, each=keeping.take)
+    keeping.say_guessed()
+    job.finish(result, inputs=lists, entry=lambda _, __: keeping.found)
+
+
+class _Entries:
+    """What the store is to keep of each record, where there is one: an entry of it, or one of every run-down listed."""
+
+    def __init__(self, job: Job):
+        self.job, self.given = job, job.given
+        self.found: list[Entry] = []
+        self.guessed: set[str] = set()
+
+    def take(self, result: WheelsResult, telemetry: Telemetry) -> None:
+        if self.given["store"] is None:
+            return
+        from ..kit.timeline import utc_label
+        from ..trends.entries import run_down_entries, wheel_entry
+
+        name, guesses = self.given["name"], self.given["store_guesses"]
+        self.guessed.update(w.name for w in result.wheels if w.is_guessed)
+        if self.given["run_downs"] is not None:
+            self.found += run_down_entries(result, telemetry, self.job.craft, name, guesses=guesses)
+            return
+        if len(self.given["files"]) > 1:
+            name = f"{name or 'wheels'}-{utc_label(telemetry.span()[0])}"
+        self.found.append(wheel_entry(result, telemetry, self.job.craft, name, guesses=guesses))
+
+    def say_guessed(self) -> None:
+        if self.guessed and not self.given["store_guesses"]:
+            say(
+                f"not kept, since their run-downs are only guessed: drag of {', '.join(sorted(self.guessed))} "
+                "(name them with --run-down, or give --store-guesses)"
+            )
 
 
 def _each(files: list[Path], job: Job) -> Iterator[Telemetry]:
