@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from ...kit.errors import BadInput, some_of
 from ...kit.timeline import NS
 from ..environment import NAMES, environment_of
+from .result import KnownTorque
 
 if TYPE_CHECKING:
     from ..environment import Air
@@ -23,16 +24,6 @@ _BELIEFS = {
     "gravity-gradient": "an inertia", "sunlight": "[sunlight]", "dipole": "[magnetics]", "drag": "[aerodynamics]",
     "rods": "[[torque_rods]]",
 }  # fmt: skip
-
-
-@dataclass(frozen=True)
-class KnownTorque:
-    """One torque that was taken off: its name, where its vectors are from, its size and one sigma (M, 3) [N m]."""
-
-    name: str
-    source: str
-    torque_Nm: np.ndarray
-    torque_sigma_Nm: np.ndarray
 
 
 def check_known(names) -> tuple[str, ...]:

@@ -20,7 +20,6 @@ from ..fused import PEAK_REACH_S, AxisData, excursions, heights
 
 if TYPE_CHECKING:
     from ..firing import Gained
-    from .known import KnownTorque
 
 Column = Annotated[Numbers | Rows, Doc("one number an instant; for all axes three")]
 
@@ -133,6 +132,16 @@ class Impulse:
             "start_s": self.start_s, "stop_s": self.stop_s, "axis": self.axis, "impulse_Nms": self.impulse_Nms,
             "impulse_sigma_Nms": self.impulse_sigma_Nms,
         }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class KnownTorque:
+    """One torque that was taken off: its name, where its vectors are from, its size and one sigma (M, 3) [N m]."""
+
+    name: str
+    source: str
+    torque_Nm: np.ndarray
+    torque_sigma_Nm: np.ndarray
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
