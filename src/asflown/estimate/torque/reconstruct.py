@@ -16,6 +16,7 @@ from .choice import method_called
 from .consistency import consistency
 from .known import check_known, without_known
 from .result import TorqueResult
+from .rods import rods_doubt
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -165,7 +166,7 @@ def _doubts(subject: Subject, answer: Answer, *, relative: bool) -> Doubts:
         found.append(THRUSTERS_FIRE(thrusters=subject.firing))
     if relative:
         found.append(PER_SPIN_INERTIA(what="torque and momentum are"))
-    return Doubts([*found, *consistency(subject, answer)])
+    return Doubts([*found, rods_doubt(subject.telemetry, answer.sigma_Nm), *consistency(subject, answer)])
 
 
 def _nothing_changes(telemetry: Telemetry) -> bool:
