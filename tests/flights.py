@@ -14,8 +14,8 @@ from asflown.kit.timeline import NS, utc_to_tai_ns
 from asflown.sim.flight.closed_loop import Flight, fly
 from asflown.telemetry.channels import kind_of
 from asflown.telemetry.load import load_telemetry
-from asflown.telemetry.write import write_table
 from asflown.telemetry.telemetry import Channel, Telemetry
+from asflown.telemetry.write import write_table
 from conftest import ROOT, flight_data
 
 CASSINI = load_craft("cassini")

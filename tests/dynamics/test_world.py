@@ -3,6 +3,7 @@
 import socket
 from datetime import datetime
 
+import astropy.units as u
 import numpy as np
 import pytest
 
@@ -14,7 +15,7 @@ from asflown.dynamics.orbit import EARTH_POLAR_RADIUS_M, EARTH_RADIUS_M, flown
 from asflown.dynamics.sun import ASTRONOMICAL_UNIT_M, SUN_RADIUS_M, sun_direction, sunlit
 from asflown.dynamics.thermosphere import density_at, exponential_density
 from asflown.kit.errors import BadInput
-from asflown.kit.timeline import NS, _from_ns, utc_to_tai_ns
+from asflown.kit.timeline import NS, utc_to_tai_ns
 
 ORBIT = load_craft("pyramid").orbit
 ARCSEC = np.radians(1 / 3600)
@@ -34,6 +35,13 @@ def hour():
     """An hour at 2 Hz: times, positions."""
     t = ORBIT.epoch / NS + np.arange(0, 3600, 0.5)
     return t, flown(ORBIT, t)[0]
+
+
+def tai_time(tai_s):
+    """astropy's time of seconds on the TAI axis."""
+    from astropy.time import Time
+
+    return Time("2000-01-01T00:00:00", scale="tai") + np.asarray(tai_s) / 86_400.0 * u.day
 
 
 def of_years(count=40):
@@ -76,7 +84,7 @@ def test_law_earth_fixed_axes_agree_with_astropy_within_the_stated_error():
 
     tai_s = of_years(30)[:24]  # the years of astropy's table
     r = 7e6 * np.column_stack([np.cos(tai_s), np.sin(tai_s), np.full(len(tai_s), 0.5)])
-    when = _from_ns(np.rint(tai_s * NS).astype(np.int64))
+    when = tai_time(tai_s)
     theirs = SkyCoord(CartesianRepresentation(r.T * u.m), frame=GCRS(obstime=when)).transform_to(ITRS(obstime=when))
     ours = np.einsum("nij,nj->ni", earth_fixed(tai_s), r)
     off = np.linalg.norm(ours - theirs.cartesian.xyz.to_value(u.m).T, axis=1) / np.linalg.norm(r, axis=1)
@@ -106,7 +114,7 @@ def test_law_the_sun_stands_where_astropy_sees_it():
     from astropy.coordinates import get_sun
 
     tai_s = of_years(25)[:22]
-    theirs = get_sun(_from_ns(np.rint(tai_s * NS).astype(np.int64))).cartesian.xyz.value.T
+    theirs = get_sun(tai_time(tai_s)).cartesian.xyz.value.T
     theirs /= np.linalg.norm(theirs, axis=1, keepdims=True)
     assert np.linalg.norm(sun_direction(tai_s) - theirs, axis=1).max() < 1 * ARCSEC
     dense = tai_s[0] + np.arange(0, 10 * 86_400, 300.0)
@@ -206,7 +214,7 @@ def test_law_the_field_is_that_of_a_dipole_to_a_quarter():
     assert size.max() / size.min() == pytest.approx(2, rel=0.25)
 
 
-@pytest.mark.parametrize("date", ["1890-01-01", "2045-01-01"])
+@pytest.mark.parametrize("date", ["2045-01-01", "2100-01-01"])
 def test_a_date_outside_the_field_s_years_is_refused(date, capsys):
     with pytest.raises(BadInput, match="from 1900 to 20"):
         field_at(np.array([[7e6, 0, 0]]), np.array([utc_to_tai_ns(date) / NS]))

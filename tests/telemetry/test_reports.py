@@ -47,7 +47,7 @@ def test_recovery_unsigned_speeds_with_a_declared_wrap(case):
 @of("03")
 def test_recovery_a_held_tachometer_is_left_out(case):
     result = wheels(load_telemetry(case / "coast.csv"), load_craft(case / "micro.toml"), run_down=["2"])
-    record = next(w for w in result.record()["wheels"] if w["wheel"] == "2")
+    record = next(w for w in result.record()["wheels"] if w["name"] == "2")
     assert record["coulomb_Nm"] == pytest.approx(2.0e-4, rel=0.02) and record["viscous_Nms"] == pytest.approx(
         4.0e-6, rel=0.05
     )

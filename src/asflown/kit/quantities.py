@@ -17,7 +17,7 @@ from .errors import BadInput, some_of
 _LARGEST = 1e60
 
 _NUMBER = re.compile(r"[-+]?(?:\d{1,400}\.?\d{0,400}|\.\d{1,400})(?:[eE][-+]?\d{1,5})?", re.ASCII)
-_LONGEST = 10_000  # characters of a quantity
+_LONGEST = 2_000_000  # characters of a quantity
 
 #: Units as people write them -> as astropy does.
 _WRITTEN = {

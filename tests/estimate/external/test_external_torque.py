@@ -386,9 +386,8 @@ def test_the_verb_refuses(words, tmp_path, monkeypatch):
 
 
 def test_law_known_torques_that_are_taken_off_leave_nothing(tmp_path):
-    from orbiter import drawn, fly
-
     from asflown.craft.surroundings import Magnetics
+    from orbiter import drawn, fly
 
     flight = drawn(3, sunlight=np.zeros(3), drag=np.zeros(3))
     tlm, craft, _ = fly(flight)

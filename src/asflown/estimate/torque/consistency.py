@@ -9,6 +9,7 @@ import numpy as np
 from ...kit.doubts import Doubt, Kind, Severity
 from ...kit.errors import BadInput
 from ...telemetry.channels import AXES
+from ..subject import turns
 from .momentum import Momentum
 from .transfer import NOT_HELD, Transfer
 
@@ -60,8 +61,9 @@ def consistency(subject: Subject, answer: Answer) -> list[Doubt]:
         b = ready.get("transfer") or Transfer().estimate(subject, ())
     except BadInput:
         return []  # too short for one of the two: nothing to compare
-    if b.doubts.has(NOT_HELD):
-        return []  # the attitude error then answers to the command too
+    turned = subject.slewing or turns(subject.telemetry)
+    if b.doubts.has(NOT_HELD) and (turned or not subject.telemetry.has_axes("body_rate")):
+        return []  # the attitude error then answers to the command too; where the gyros see a hold, its unit may be wrong
     return [d for j in range(3) for d in _compared(a, b, j)]
 
 

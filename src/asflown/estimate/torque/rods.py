@@ -27,13 +27,15 @@ RODS_PULSE = Kind(
 )  # fmt: skip
 
 
-def rods_doubt(telemetry: Telemetry, sigma_Nm: np.ndarray) -> Doubt | None:
-    """That the rods' pulses are not in the band of a torque with the sigma (M, 3) [N m]; None where they do not matter."""
-    known = sigma_Nm[np.isfinite(sigma_Nm)]
-    if len(known) == 0 or not telemetry.has_axes("torque_rod_dipole"):
+def rods_doubt(telemetry: Telemetry, sigma_Nm: np.ndarray | None) -> Doubt | None:
+    """That the rods' pulses are not in the band of a torque with the sigma (M, 3) [N m]; None where they do not matter.
+
+    Without a sigma every pulse matters."""
+    if not telemetry.has_axes("torque_rod_dipole"):
         return None
+    known = np.zeros(1) if sigma_Nm is None else sigma_Nm[np.isfinite(sigma_Nm)]
     tai_ns, dipole = together(telemetry, [f"torque_rod_dipole_{a}" for a in AXES])
-    if len(tai_ns) < 3:
+    if len(tai_ns) < 3 or len(known) == 0:
         return None
     width = round(_AVERAGED_S * NS / max(float(np.median(np.diff(tai_ns))), 1.0))
     sums, at = np.vstack([np.zeros(3), np.cumsum(dipole, axis=0)]), np.arange(len(dipole))
