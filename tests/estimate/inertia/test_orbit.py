@@ -66,6 +66,7 @@ def test_recovery_with_gravity_alone_by_every_method(tmp_path):
         assert np.all(np.abs(error) < 3.5 * elements_of(result.inertia_sigma_random_kgm2))
 
 
+@pytest.mark.slow
 def test_recovery_with_field_sunlight_and_drag(tmp_path):
     result, error = of("slews", tmp_path)
     sigma = elements_of(result.inertia_sigma_random_kgm2)
