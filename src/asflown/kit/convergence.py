@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import fft, stats
+from scipy.special import ndtri
 
 
 class Convergence(NamedTuple):
@@ -43,8 +43,9 @@ def _split(chains: np.ndarray) -> np.ndarray:
 
 def _normal(chains: np.ndarray) -> np.ndarray:
     """Normal scores of the ranks."""
-    rank = stats.rankdata(chains, method="average").reshape(chains.shape)
-    return stats.norm.ppf((rank - 0.375) / (chains.size + 0.25))
+    _, which, counts = np.unique(chains, return_inverse=True, return_counts=True)
+    rank = (np.cumsum(counts) - (counts - 1) / 2)[which].reshape(chains.shape)  # equal draws share their mean rank
+    return ndtri((rank - 0.375) / (chains.size + 0.25))
 
 
 def _r_hat(chains: np.ndarray) -> float:
@@ -80,6 +81,6 @@ def _autocovariance(chains: np.ndarray) -> np.ndarray:
     """Of each chain at every lag, over its length."""
     n = chains.shape[1]
     centred = chains - chains.mean(axis=1, keepdims=True)
-    size = fft.next_fast_len(2 * n)
-    power = np.abs(fft.rfft(centred, size, axis=1)) ** 2
-    return fft.irfft(power, size, axis=1)[:, :n] / n
+    size = 2 ** int(np.ceil(np.log2(2 * n)))
+    power = np.abs(np.fft.rfft(centred, size, axis=1)) ** 2
+    return np.fft.irfft(power, size, axis=1)[:, :n] / n

@@ -16,7 +16,7 @@ from ..telemetry.channels import split_header
 from ..telemetry.formats import read_parquet
 from ..telemetry.tables import Table, numbers_of, times_of, words_of
 from ..telemetry.text import read_csv
-from ..telemetry.times import scale_called
+from ..telemetry.times import Scale, scale_called
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -141,7 +141,7 @@ class Columns:
             return None
         j, unit = self.at["time"]
         origin = 0 if self.table.epoch is None else int(utc_to_tai_ns(self.table.epoch))
-        return times_of(self.table, j, scale_called(unit or "utc"), origin)
+        return times_of(self.table, j, scale_called(unit or "utc") or Scale("utc"), origin)
 
 
 def _factor(name: str, unit: str) -> float:

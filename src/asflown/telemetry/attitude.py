@@ -74,8 +74,8 @@ def check_attitude(telemetry: Telemetry, readings: dict[str, tuple[np.ndarray, n
             channel="quaternion",
             remedy=remedy,
         )
-    if (other := against_rates(rate, w)) is not None:
-        return _scales(_doubted(telemetry, other), rate, w)
+    if (doubt := against_rates(rate, w)) is not None:
+        return _scales(_doubted(telemetry, doubt), rate, w)
     turned = next(iter(odds))  # the conjugate comes first
     if odds[turned][0] > -SIGNIFICANT:
         telemetry = _doubted(telemetry, TURNS_TOO_LITTLE(rms_rad_s=_rms(w)))

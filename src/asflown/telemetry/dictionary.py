@@ -331,7 +331,7 @@ def _contradicted(table: Table | TextFile, entry: ChannelDictionary, epoch_ns: i
         and time.scale == 1
         and (heading.unit != scale.unit or (heading.dated and heading != scale))
     ):
-        detail = f"the heading of {time.column!r} says [{headed[time.column]}], the channel dictionary {time.format!r}; the dictionary was followed"
+        detail = f"the heading of {time.column!r} says [{heading.unit if heading.numeric else heading.kind}], the channel dictionary {time.format!r}; the dictionary was followed"
         found.append(Finding("", "unit", 1, epoch_ns, detail))
     return found
 

@@ -146,8 +146,8 @@ def _check_size(cells: int) -> None:
 
 def _coordinate_table(data, clock: str, others: list) -> Table:
     heading, epoch, instants = _cf_time(data[clock], data.attrs.get("epoch"))
-    headings, columns, blanked = [heading], [np.asarray(data[clock].values)], {}
-    columns[0] = typed(columns[0])
+    headings, blanked = [heading], {}
+    columns: list = [typed(data[clock].values)]
     for name in others:
         variable = data[name]
         unit = said(variable.attrs["units"]) if "units" in variable.attrs else None
@@ -264,7 +264,8 @@ def read_fits(path: Path) -> list[Table]:
 
 def _from_arrays(columns: Iterable[tuple[str, str | None, np.ndarray, Any]], epoch=None) -> Table:
     """Columns (name, unit, values (N,) or (N, M), fill) as a table."""
-    headings, cells, blanked = [], [], {}
+    headings, blanked = [], {}
+    cells: list = []
     for name, unit, values, fill in columns:
         parts = [("", values)] if values.ndim == 1 else [
             (f"_{m}", values[:, k]) for k, m in enumerate(member_names(name, values.shape[1]))
@@ -396,8 +397,8 @@ def read_excel(path: Path) -> list[Table]:
             book.close()
     except Exception as why:  # openpyxl raises many kinds for damaged files
         raise damaged("Excel", why) from None
-    for title, rows in sheets.items():
-        rows = [(n, _trimmed(r)) for n, r in enumerate(rows, 1) if any(c.strip() for c in r)]
+    for title, sheet in sheets.items():
+        rows = [(n, _trimmed(r)) for n, r in enumerate(sheet, 1) if any(c.strip() for c in r)]
         if len(rows) > 1:
             left = [t for t in sheets if t != title]
             notes = (f"the sheet {title!r} was read", *([f"other sheets were not: {some_of(left)}"] if left else []))

@@ -38,7 +38,8 @@ def digest_of(tables: list[Table]) -> str:
 
 
 def _of_mapping(data: Mapping) -> Table:
-    headings, columns = [], []
+    headings: list[str] = []
+    columns: list = []
     for name, given in data.items():
         values, unit = (
             given if isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], str) else (given, None)

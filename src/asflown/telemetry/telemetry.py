@@ -302,7 +302,8 @@ class Telemetry:
         import xarray
 
         clocks: list[np.ndarray] = []
-        variables, coordinates = {}, {}
+        variables: dict[str, tuple] = {}
+        coordinates = {}
         for name, c in self.channels.items():
             at = next((k for k, t in enumerate(clocks) if np.array_equal(t, c.tai_ns)), len(clocks))
             if at == len(clocks):

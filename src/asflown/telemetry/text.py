@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import gzip
+import io
 import mmap
 import re
 import tempfile
@@ -73,7 +74,7 @@ def read_text(path: Path) -> TextFile:
 def read_csv(data: bytes) -> Table:
     """A small table that is in memory already, with all its cells as text."""
     if data[:2] == b"\x1f\x8b":
-        data = b"".join(_unpacked(gzip.io.BytesIO(data)))
+        data = b"".join(_unpacked(io.BytesIO(data)))
     text = _decoded(data)
     return _cell_by_cell(text, form_of(text.split("\n")))
 
@@ -159,7 +160,8 @@ def form_of(lines: Sequence[str]) -> Form:
     """How a text table is written, from its first lines.
 
     The delimiter is the one that divides the rows alike; see ``form_of_rows`` for the rest."""
-    epoch, said_delimiter, rows, comment = None, None, [], None
+    epoch, said_delimiter, comment = None, None, None
+    rows: list[tuple[int, str]] = []
     for number, line in enumerate(lines, 1):
         if line.startswith("#"):
             said = _EPOCH_COMMENT.match(line)

@@ -42,7 +42,9 @@ def health_in(store: str, craft: str | None, kind: str | None, limits: list[str]
     if kind is None:
         kind = MOVES[0] if MOVES[0] in kinds else kinds[0]
         if kind not in MOVES and len(kinds) > 1:
-            raise BadInput("the store has figures of several kinds", remedy=f"Choose one with --kind: {some_of(kinds)}.")
+            raise BadInput(
+                "the store has figures of several kinds", remedy=f"Choose one with --kind: {some_of(kinds)}."
+            )
     elif kind not in kinds:
         raise BadInput(f"the store has no figures of merit of kind {kind}", remedy=f"Its kinds: {some_of(kinds)}.")
     return _judged(entries, kind, limits_of(limits, entries), **options)

@@ -6,7 +6,9 @@ import typer
 
 STORE = typer.Option(..., "--store", help="A path (SQLite) or a URL (sqlite:///…, postgresql://…).")
 KIND = typer.Option(
-    None, "--kind", help="deploy, stow, wheels, inertia, thrust, sources or gates (default: deploy, or the only one in the store)."
+    None,
+    "--kind",
+    help="deploy, stow, wheels, inertia, thrust, sources or gates (default: deploy, or the only one in the store).",
 )
 WHOSE = typer.Option(None, "--craft", help="One craft, where the store has several.")
 FIGURES = typer.Option(None, "--figures", help="A Python file that declares further figures of merit.")

@@ -158,7 +158,9 @@ def known_terms(subject: Subject, tai_ns: np.ndarray, names: Sequence[str], air:
     missing = [f"{name} needs {what}" for name, what in around.left_out.items()]
     missing += [f"{t.name} needs {_BELIEFS[t.name]} in the craft file" for t in around.terms if t.torque_Nm is None]
     if missing:
-        raise BadInput(f"not all known torques can be computed: {some_of(missing)}", remedy="Leave these out of --with.")
+        raise BadInput(
+            f"not all known torques can be computed: {some_of(missing)}", remedy="Leave these out of --with."
+        )
     return around
 
 

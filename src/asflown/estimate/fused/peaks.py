@@ -13,7 +13,6 @@ whose peaks are too far off as it is (studies/peak_scale.py).
 from __future__ import annotations
 
 import numpy as np
-from scipy import signal
 
 from ...kit.ensemble import _ONE_SIGMA, spread
 
@@ -35,7 +34,9 @@ def excursions(torque: np.ndarray, sigma: np.ndarray | None = None) -> np.ndarra
     if known.sum() < 3 or not np.any(torque[sure]):
         return np.empty(0, np.intp)
     least, filled = _STANDS_OUT * np.max(np.abs(torque[sure])), np.where(known, torque, 0.0)
-    found = [signal.find_peaks(sign * filled, height=least, prominence=least)[0] for sign in (1, -1)]
+    from scipy.signal import find_peaks  # half a second of import that only this needs
+
+    found = [find_peaks(sign * filled, height=least, prominence=least)[0] for sign in (1, -1)]
     at = np.sort(np.concatenate(found))
     return at[sure[at]]
 

@@ -42,7 +42,9 @@ def with_orbit(record: SlewRecord, telemetry: Telemetry, start_ns: int, I_B: np.
     words = gravity_words(None if record.relative else I_B, span)
     orbit, body, doubts, count = orbit_in(telemetry, start_ns, words)
     if orbit is None:
-        few = ORBIT_TOO_SHORT(why=f"{count} positions", left_out="by an unknown amount") if count and not doubts else None
+        few = (
+            ORBIT_TOO_SHORT(why=f"{count} positions", left_out="by an unknown amount") if count and not doubts else None
+        )
         return _without(record, *doubts, few)
     doubts = Doubts([*doubts, GRAVITY(body=body)])
     left_out = words(orbit)

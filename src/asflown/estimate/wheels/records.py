@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...kit.doubts import Doubts
+from ...kit.doubts import Doubt, Doubts
 from ...kit.errors import BadInput, some_of
 from .named import NamedRunDown, check_named, named_run_downs
 from .study import LOW_SPEED, wheels
@@ -110,7 +110,7 @@ def _together(seen: list[_Seen]) -> WheelsResult:
     """``seen``: in order of time."""
     first = seen[0]
     names = dict.fromkeys(w.name for s in seen for w in s.result.wheels)
-    kept: dict[tuple, object] = {}
+    kept: dict[tuple, Doubt] = {}
     for s in seen:
         for d in s.result.doubts:
             # what is grave is told of every record, the rest once
