@@ -315,8 +315,10 @@ def translated(tables: list[Table] | list[TextFile], entry: ChannelDictionary) -
 
 def _contradicted(table: Table | TextFile, entry: ChannelDictionary, epoch_ns: int) -> list[Finding]:
     """Columns whose heading names another unit than the dictionary, which scales them by nothing else."""
-    said = {name: unit for h in table.headings for name, unit in [split_header(h) or (h, None)] if unit is not None}
-    headed = {h: (split_header(h) or (h, None))[1] for h in table.headings} | said
+    split = {h: split_header(h) or (h, None) for h in table.headings}
+    headed = {h: unit for h, (_, unit) in split.items()} | {
+        name: unit for name, unit in split.values() if unit is not None
+    }
     found = []
     for c in entry.channel:
         unit = headed.get(c.column)

@@ -97,8 +97,8 @@ def _plan(c: Channel, telemetry: Telemetry) -> tuple[np.ndarray | None, np.ndarr
         _refuse(c, telemetry, len(late) + len(strays))
     used = np.setdiff1d(np.arange(len(t)), strays)
     order = used[np.argsort(t[used], kind="stable")]
-    beyond = order[_strays(t[order])]
-    return np.setdiff1d(order, beyond)[np.argsort(t[np.setdiff1d(order, beyond)], kind="stable")] if len(beyond) else order, np.union1d(strays, beyond), late  # fmt: skip
+    beyond = _strays(t[order])
+    return np.delete(order, beyond), np.union1d(strays, order[beyond]), late
 
 
 def _strays(t: np.ndarray) -> np.ndarray:

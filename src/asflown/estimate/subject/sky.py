@@ -210,30 +210,27 @@ def _size(field: _Vector) -> Doubt | None:
 def _field(telemetry: Telemetry, craft: Craft | None) -> _Vector | None:
     from ...dynamics.magnetic_field import field_at
 
-    found = _measured(telemetry, "magnetic_field")
-    if found is None:
-        return None
-    tai_ns, B, R = found
-    state = _state(telemetry, craft, tai_ns)
-    if state is None:
-        return None
     try:
-        true = field_at(state[0], tai_ns / NS)
+        return _held_against(telemetry, craft, "magnetic_field", field_at, _FIELD_OFF)
     except BadInput:  # another date than the model's, or below the surface: said where the orbit is used
         return None
-    return _Vector(B, true, R, tai_ns / NS, lvlh_axes(*state), _FIELD_OFF)
 
 
 def _sun(telemetry: Telemetry, craft: Craft | None) -> _Vector | None:
     """Of an Earth orbiter, or one whose place is not told: the Sun as the Earth sees it."""
-    found = _measured(telemetry, "sun_direction")
+    return _held_against(telemetry, craft, "sun_direction", lambda _, tai_s: sun_direction(tai_s), _SUN_OFF)
+
+
+def _held_against(telemetry: Telemetry, craft: Craft | None, stem: str, true, off: float) -> _Vector | None:
+    """A measured vector beside ``true`` (positions (N, 3) [m], TAI (N,) [s] -> (N, 3), inertial); None where there is no telling."""
+    found = _measured(telemetry, stem)
     if found is None:
         return None
-    tai_ns, s, R = found
+    tai_ns, vector, R = found
     state = _state(telemetry, craft, tai_ns)
     if state is None:
         return None
-    return _Vector(s, sun_direction(tai_ns / NS), R, tai_ns / NS, lvlh_axes(*state), _SUN_OFF)
+    return _Vector(vector, true(state[0], tai_ns / NS), R, tai_ns / NS, lvlh_axes(*state), off)
 
 
 def _measured(telemetry: Telemetry, stem: str):
