@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .compiled import jit
-from .smoother import Measurements, Model, forward
+from .smoother import Measurements, Model, forward, multiply
 
 #: Columns taken through at a time: means of every step are kept for the backward pass.
 _BATCH_VALUES = 4_000_000
@@ -103,20 +103,6 @@ def _roots(Q: np.ndarray) -> np.ndarray:
 
 
 @jit
-def _advance(a, x, out, active):
-    """out = a x for the first ``active`` columns, zeros of a skipped."""
-    n = len(a)
-    for r in range(n):
-        for c in range(active):
-            out[r, c] = 0.0
-        for i in range(n):
-            f = a[r, i]
-            if f != 0.0:
-                for c in range(active):
-                    out[r, c] += f * x[i, c]
-
-
-@jit
 def _innovate(h, x, value, out, active):
     """out = value - h x."""
     for c in range(active):
@@ -136,7 +122,7 @@ def _whiten(A, which, H, start, row, variance, product, values, begin):
     active = 0
     for k in range(len(which)):
         if k > 0:
-            _advance(A[which[k]], x, y, active)
+            multiply(A[which[k]], x, y, active)
             x, y = y, x
         while active < columns and begin[active] <= k:
             for r in range(n):
@@ -161,7 +147,7 @@ def _respond(A, which, H, start, row, state, slope, torque, rise):
     x, y = np.zeros((n, columns)), np.zeros((n, columns))
     for k in range(len(which)):
         if k > 0:
-            _advance(A[which[k]], x, y, columns)
+            multiply(A[which[k]], x, y, columns)
             x, y = y, x
         for c in range(columns):
             x[state, c], x[slope, c] = torque[k, c], rise[k, c]
@@ -182,7 +168,7 @@ def _simulate(A, which, H, start, row, noise, reading, states):
     x, y = np.zeros((n, columns)), np.zeros((n, columns))
     for k in range(steps):
         if k > 0:
-            _advance(A[which[k]], x, y, columns)
+            multiply(A[which[k]], x, y, columns)
             x, y = y, x
         for r in range(n):
             for c in range(columns):
@@ -208,7 +194,7 @@ def _smooth(A, which, H, start, row, variance, product, covariance, values, stat
     x, y = np.zeros((n, columns)), np.zeros((n, columns))
     for k in range(steps):
         if k > 0:
-            _advance(A[which[k]], x, y, columns)
+            multiply(A[which[k]], x, y, columns)
             x, y = y, x
         for i in range(start[k], start[k + 1]):
             _innovate(H[row[i]], x, values[i], innovation[i], columns)
@@ -239,7 +225,7 @@ def _smooth(A, which, H, start, row, variance, product, covariance, values, stat
                     for c in range(columns):
                         adjoint[r, c] -= f * dot[c]
         if k > 0:
-            _advance(A[which[k]].T, adjoint, turned, columns)
+            multiply(A[which[k]].T, adjoint, turned, columns)
             adjoint, turned = turned, adjoint
     return kept
 

@@ -416,8 +416,8 @@ def _slopes(A, which, H, rows, start, row, period, mean, covariances, innovation
         if k < steps - 1:  # the step from here on
             kind, phase = which[k + 1], (k + 1) % phases
             if not (crossed_again and origin[k + period] == origin[k]):
-                _multiply(whole[phase], A[kind], work)
-                _multiply(work, P, crossed[phase])
+                multiply(whole[phase], A[kind], work, n)
+                multiply(work, P, crossed[phase], n)
             for r in range(n):
                 for c in range(n):
                     by_A[kind, r, c] -= later[r] * x[c] + crossed[phase, r, c]
@@ -459,16 +459,16 @@ def _slopes(A, which, H, rows, start, row, period, mean, covariances, innovation
 
 
 @jit
-def _multiply(a, b, out):
-    """out = a b."""
+def multiply(a, b, out, columns):
+    """out = a b for the first ``columns`` columns, zeros of a skipped."""
     n = len(a)
     for r in range(n):
-        for c in range(n):
+        for c in range(columns):
             out[r, c] = 0.0
         for i in range(n):
             f = a[r, i]
             if f != 0.0:
-                for c in range(n):
+                for c in range(columns):
                     out[r, c] += f * b[i, c]
 
 
