@@ -1,6 +1,7 @@
 """The house itself: which room may know which, and what a cold start may cost."""
 
 import ast
+import functools
 import graphlib
 import subprocess
 import sys
@@ -64,10 +65,21 @@ FACES = [f"estimate.{name}" for name in MAY_IMPORT_IN_ESTIMATE] + [
 ]
 
 
-def imported(path: Path):
+@functools.cache
+def nodes(path: Path) -> tuple[ast.AST, ...]:
+    """All nodes of a file's syntax; every file is parsed once, however many tests ask."""
+    return tuple(ast.walk(ast.parse(path.read_text())))
+
+
+@functools.cache
+def imported(path: Path) -> tuple[tuple[tuple[str, ...], str], ...]:
     """(module, name) for everything that a file of asflown imports from asflown; the module as a tuple of its parts."""
+    return tuple(_imported(path))
+
+
+def _imported(path: Path):
     parts = path.relative_to(SRC).parts[:-1]
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in nodes(path):
         if isinstance(node, ast.ImportFrom):
             tail = tuple(node.module.split(".")) if node.module else ()
             if node.level:
@@ -91,7 +103,7 @@ def imports_of(room: str) -> set[str]:
     rooms = set()
     for path in (SRC / room).rglob("*.py"):
         depth = len(path.relative_to(SRC).parts) - 1
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in nodes(path):
             if isinstance(node, ast.ImportFrom):
                 if node.level > depth:
                     names = [node.module.split(".")[0]] if node.module else [a.name for a in node.names]
@@ -210,7 +222,7 @@ def words_that_decide(path: Path):
             return is_doubt(node.args[0])
         return isinstance(node, ast.Name) and node.id in ("d", "doubt", "said", "sentence")
 
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in nodes(path):
         if isinstance(node, ast.Compare) and any(isinstance(o, ast.In | ast.NotIn) for o in node.ops):
             if is_doubt(node.comparators[0]) or (
                 isinstance(node.left, ast.Constant)
@@ -234,7 +246,7 @@ def test_every_kind_of_doubt_is_declared_where_it_is_found():
     """A kind's id begins with the room, or the sub-package of estimate, that declares it; ids are unique by construction."""
     wrong = []
     for path in SRC.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in nodes(path):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Kind" and node.args:
                 if not isinstance(node.args[0], ast.Constant):
                     continue
@@ -256,7 +268,7 @@ def test_no_function_is_longer_than_sixty_lines():
     found = {}
     for path in SRC.rglob("*.py"):
         name = str(path.relative_to(SRC))
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in nodes(path):
             if isinstance(node, ast.FunctionDef):
                 text = ast.get_docstring(node, clean=False)
                 lines = node.end_lineno - node.lineno + 1 - (text.count("\n") + 1 if text else 0)

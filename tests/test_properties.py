@@ -71,7 +71,7 @@ def answers(*words) -> None:
         assert done.record and all(line.startswith("not compared, ") for line in done.err.splitlines())
 
 
-@settings(QUIETLY, max_examples=60)
+@settings(QUIETLY, max_examples=30)
 @given(seed=st.integers(0, 10**9), count=st.integers(1, 4))
 def test_any_accident_to_a_file_gets_an_answer(seed, count, tmp_path):
     path = tmp_path / "t.csv"
@@ -81,7 +81,7 @@ def test_any_accident_to_a_file_gets_an_answer(seed, count, tmp_path):
     answers("torque", path, "--json", "--method", method, "--variant", ["corrected", "printed"][seed // 3 % 2])
 
 
-@settings(QUIETLY, max_examples=60)
+@settings(QUIETLY, max_examples=30)
 @given(option=st.sampled_from(["--start", "--stop", "--inertia", "--cm", "--axis", "--window", "--order", "--model", "--craft", "--moving"]),
        value=st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=12) | st.floats().map(repr) | st.integers().map(str))  # fmt: skip
 def test_any_value_of_an_option_gets_an_answer(option, value, tmp_path):
