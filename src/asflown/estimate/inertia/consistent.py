@@ -14,11 +14,12 @@ from ...kit.rotations import rotation
 from .contradictions import MOST_STEPS
 from .levels import first_levels
 from .linear import WHEEL
+from .misread import in_words
 from .motion import Layout
 from .prior import possible, prior_for
-from .result import Answer, Evidence
+from .result import Answer, Evidence, Misread
 from .slews import find_slews
-from .steps import momentum_step
+from .steps import momentum_step, other_vectors
 from .swings import SWINGS
 from .whole_motion import fit_slews
 
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 #: A step of momentum is kept where it is this large, squared, in its own covariance: of 3 degrees of freedom, chance gives it
 #: once in 1e8, at each of some hundred instants tried.
 _STEP_KEPT = 40.0
+#: A wheel's vector fits otherwise where its difference is this large, squared, in its own covariance; healthy flights have up to 12.
+_OTHERWISE = 40.0
 #: Time stamps apart by more than this are spoken of. [s]
 _LATE_S = 0.05
 #: Wheel readings that miss the fit by so many times their own scatter are not explained by it.
@@ -100,6 +103,7 @@ def by_whole_motion(
         slews=tuple(find_slews(evidence.time_s, evidence.omega_rad_s, fit.levels.rate)),
         evidence=evidence,
         settings=_settings(fit) | _without_steps(fit, unparted),
+        misread=_misread(fit),
         doubts=[*fit.record.doubts, *leaning, *impossible, *_fit_doubts(fit), _step_doubt(fit, unparted)],
     )
 
@@ -156,6 +160,16 @@ def _step_doubt(fit: SlewFit, unparted: SlewFit | None) -> Doubt | None:
         sigmas=abs(moved[k]) / fit.sigma[k],
         steps=len(fit.record.steps),
     )
+
+
+def _misread(fit: SlewFit) -> Misread | None:
+    """The wheel whose vector fits otherwise, where one plainly does."""
+    told = other_vectors(fit)
+    k = max(range(len(told)), key=lambda k: told[k].square, default=None)
+    if k is None or told[k].square < _OTHERWISE:
+        return None
+    vector = fit.record.axes[k]
+    return Misread(in_words(fit.record.wheels[k], vector, vector + told[k].value), told[k].square, told[k].moved)
 
 
 def _settings(fit: SlewFit) -> dict:

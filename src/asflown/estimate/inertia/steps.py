@@ -1,18 +1,24 @@
-"""Whether the total momentum stepped somewhere: a thruster that no channel reports."""
+"""What else would explain a fitted record: a step of momentum (a thruster that no channel reports), or another vector of one wheel.
+
+Each is let in with motion and levels held, as more columns of one filter pass: a score test, in the fit's own covariance."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ...kit.regressed import run
 from .likelihood import Around, solved
 from .linear import WHEEL
+from .misread import per_vector
+from .motion import Layout
 from .whole_motion import cadence_s, prior_of_all
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from .prior import Prior
     from .whole_motion import SlewFit
 
@@ -54,22 +60,47 @@ def momentum_step(fit: SlewFit, prior: Prior | None = None) -> tuple[float, floa
 
 def _steps_told(fit: SlewFit, arc: int, at_s: np.ndarray, around: Around) -> np.ndarray:
     """Chi square of a step of an arc's momentum at each instant (K,), each alone."""
-    z, p, momentum = fit.weighted.model, fit.layout.size, fit.record.momentum
-    steps = fit.weighted.steps(fit.levels)
+    z, momentum = fit.weighted.model, fit.record.momentum
     wheels = np.flatnonzero(z.kind == WHEEL)
     when = np.where(momentum.arc == arc, momentum.time_s, -np.inf)[z.source[wheels]]
     columns = z.Z[wheels, fit.layout.momentum(arc)]
     squares = []
     for group in np.array_split(at_s, np.ceil(len(at_s) / _STEPS_AT_ONCE)):
-        extra = np.zeros((len(z.y), 3 * len(group)))
-        after = (when[:, None] >= group)[:, :, None]
-        extra[wheels] = (columns[:, None] * after).reshape(len(wheels), -1)
-        f = run(replace(steps, Z=np.column_stack([z.Z[:, :p], extra])))
-        told = f.information
-        delta, _, slope = solved(f, fit.layout, around)
-        score = told[p + 1 :, 0] - told[p + 1 :, 1 : p + 1] @ delta
-        information = told[p + 1 :, p + 1 :] - told[p + 1 :, 1 : p + 1] @ slope
-        for k in range(len(group)):
-            own = slice(3 * k, 3 * k + 3)
-            squares.append(score[own] @ np.linalg.solve(information[own, own], score[own]))
+        after = when[:, None] >= group
+        squares += [told.square for told in _told(fit, columns[:, None] * after[:, :, None], around)]
     return np.array(squares)
+
+
+class Told(NamedTuple):
+    """Three more constants: their likeliest values, the square of these in their own covariance, and what they move the tensor's
+    elements by (6,)."""
+
+    value: np.ndarray
+    square: float
+    moved: np.ndarray
+
+
+def _told(fit: SlewFit, columns: np.ndarray, around: Around) -> Iterator[Told]:
+    """Of each group of three columns of the wheels' readings (M, K, 3), each group alone."""
+    z, p = fit.weighted.model, fit.layout.size
+    M, K = columns.shape[:2]
+    extra = np.zeros((len(z.y), 3 * K))
+    extra[z.kind == WHEEL] = columns.reshape(M, 3 * K)
+    f = run(replace(fit.weighted.steps(fit.levels), Z=np.column_stack([z.Z[:, :p], extra])))
+    told = f.information
+    delta, _, slope = solved(f, fit.layout, around)
+    score = told[p + 1 :, 0] - told[p + 1 :, 1 : p + 1] @ delta
+    information = told[p + 1 :, p + 1 :] - told[p + 1 :, 1 : p + 1] @ slope
+    for k in range(K):
+        own = slice(3 * k, 3 * k + 3)
+        value = np.linalg.solve(information[own, own], score[own])
+        yield Told(value, float(score[own] @ value), -slope[Layout.TENSOR, own] @ value)
+
+
+def other_vectors(fit: SlewFit) -> list[Told]:
+    """Of each wheel by how much its vector (axis times spin inertia) fits differently; none where wheels are not known one by one."""
+    columns = per_vector(fit.record)
+    if columns is None or fit.record.wanders:
+        return []
+    z = fit.weighted.model
+    return list(_told(fit, -columns[z.source[z.kind == WHEEL]], fit.around))
