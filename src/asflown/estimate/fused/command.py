@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from ...craft.model import WheelController
     from ..subject import Grid, Subject
 
+#: Source of a command that is none.
+HOLD = "none: an attitude is held"
+
 _QUATERNION = [f"quaternion_{m}" for m in "wxyz"]
 _COMMANDED = [f"commanded_quaternion_{m}" for m in "wxyz"]
 #: The command of a hold is smoothed over this, and over so many times the loop's own. [s], [loop times]
@@ -34,6 +37,10 @@ _SMOOTHED_S, _LOOP_TIMES = 300.0, 50.0
 _PLAIN = 3.0
 #: Shortest block whose mean is smoothed. [s]
 _BLOCK_S = 10.0
+#: In a hold the actuators do something beside the law where so many parts of the record say so, by so many standard errors of their mean.
+_PARTS, _SURE = 8, 6.0
+#: What they do is estimated from the same data that then say more of it: what it is off by is given this many of its sigmas beforehand.
+_WIDE = 3.0
 #: A craft is held to its orbit where its attitude stays this near one in LVLH axes [rad], with positions over this share of the
 #: attitudes and no fewer than so many.
 _STILL_RAD, _COVERED, _FEWEST = 0.02, 0.95, 8
@@ -50,7 +57,7 @@ FED_OTHERWISE = Kind(
 class Command:
     """On the grid: rates, their derivative and the feed-forward on the body, (M, 3); variance of the rates and of their derivatives (2, 3).
 
-    ``beside_Nm``: (3,), one sigma of what the actuators slowly do beside the law, which is in the feed-forward; ``source``: where
+    ``beside_Nm``: (3,), one sigma of what the actuators slowly do beside the law, which shifts the attitude held; ``source``: where
     the rates are from; ``gyroscopic``, ``acceleration``: what the controller feeds forward; ``doubts``: where the actuators say
     otherwise than the craft file."""
 
@@ -61,11 +68,16 @@ class Command:
     fed_Nms: np.ndarray  # its integral
     variance: np.ndarray
     beside_Nm: np.ndarray
-    lag_rad: np.ndarray  # (M, 3), by which the attitude that the loop holds is behind the one commanded
+    lag_rad: np.ndarray  # (M, 3), by which the attitude that the loop holds without a torque is behind the one commanded
     source: str
     gyroscopic: bool
     acceleration_fed: bool
     doubts: Doubts = Doubts()
+
+    @property
+    def still(self) -> bool:
+        """Whether a fixed attitude is held."""
+        return self.source == HOLD
 
     def on(self, seconds: np.ndarray, values: np.ndarray, j: int) -> np.ndarray:
         return np.interp(seconds, self.seconds, values[:, j])
@@ -75,7 +87,7 @@ class Command:
         return {j: [self._as_in_a_hold(s, j) for s in of_axis] for j, of_axis in series.items()}
 
     def _as_in_a_hold(self, s: Series, j: int) -> Series:
-        if s.row == BODY_RATE:
+        if s.row == BODY_RATE and not self.still:
             off = s.values - self.on(s.seconds, self.rate, j)
             return replace(s, values=off - np.median(off))  # the sensor's bias
         if s.row == ATTITUDE_ERROR:
@@ -187,9 +199,31 @@ def command_of(
     beside = np.zeros(3)
     for j, of_axis in series.items():
         more = _beside(of_axis, fed[:, j], at, J[j, j] * law.kd_per_s, law)
-        feed[:, j], fed[:, j] = feed[:, j] + more.at(at, 1), fed[:, j] + more.at(at, 0)
+        lag[:, j] -= more.at(at, 1) / _stiffness(law, J, j)
         beside[j] = np.sqrt(more.variance[0])
     return Command(at, rate, acceleration, feed, fed, variance, beside, lag, source, gyroscopic, pushed, doubts)
+
+
+def hold_of(subject: Subject, grid: Grid, series: dict[int, list[Series]]) -> Command | None:
+    """What the actuators slowly do beside the law while a fixed attitude is held (bearings' drag, a bias of the rate); None for nothing."""
+    law, at = subject.controller(), grid.seconds
+    J, none = law.believed_kgm2(subject.known_inertia()), np.zeros((grid.count, 3))
+    lag, sigma = none.copy(), np.zeros(3)
+    for j, of_axis in series.items():
+        s, left = _left_beside(of_axis, none[:, j], at, J[j, j] * law.kd_per_s, law)
+        ends = np.linspace(0, len(s) - 1, _PARTS + 1).astype(int)
+        slopes = np.diff(left[ends]) / np.diff(s[ends])
+        error = float(np.std(slopes, ddof=1)) / np.sqrt(_PARTS)
+        if abs(np.mean(slopes)) > _SURE * error:
+            lag[:, j], sigma[j] = -_smoothed(s, left, 1, *_smoothing(law, at)).at(at, 1) / _stiffness(law, J, j), _WIDE * error
+    if not sigma.any():
+        return None
+    return Command(at, none, none, none, none, np.zeros((2, 3)), sigma, lag, HOLD, gyroscopic=False, acceleration_fed=False)
+
+
+def _stiffness(law: WheelController, J: np.ndarray, j: int) -> float:
+    """The torque of a turn off the attitude held. [N m/rad]"""
+    return float(J[j, j]) * law.kd_per_s * law.kp_per_s
 
 
 def _lag(law: WheelController, rate: np.ndarray, step_s: float) -> np.ndarray:
@@ -298,12 +332,16 @@ def _beside(of_axis: list[Series], fed: np.ndarray, at: np.ndarray, gain: float,
 
     Bearing drag, a bias of the rate sensor, an inertia on board that is another: all shift the attitude held, and would be
     taken for a disturbance.  ``fed``: integral of the feed-forward; ``gain``: inertia x KD."""
+    return _smoothed(*_left_beside(of_axis, fed, at, gain, law), 1, *_smoothing(law, at))
+
+
+def _left_beside(of_axis: list[Series], fed: np.ndarray, at: np.ndarray, gain: float, law: WheelController):
+    """Instants, and the integral of what the actuators do beside the law and its feed-forward; as ``_beside``."""
     row = {s.row: s for s in of_axis}
     h, e = row[MOMENTUM], row[ATTITUDE_ERROR]
     turned = scipy.integrate.cumulative_trapezoid(e.values, e.seconds, initial=0)
     asked = gain * (law.kp_per_s * np.interp(h.seconds, e.seconds, turned) + np.interp(h.seconds, e.seconds, e.values))
-    left = -h.values - asked - np.interp(h.seconds, at, fed)
-    return _smoothed(h.seconds, left, 1, *_smoothing(law, at))
+    return h.seconds, -h.values - asked - np.interp(h.seconds, at, fed)
 
 
 def _smoothing(law: WheelController, at: np.ndarray) -> tuple[int, float]:
@@ -319,6 +357,6 @@ def _left_over(law: WheelController, J: np.ndarray, series, turn: np.ndarray) ->
         row = {s.row: s for s in of_axis}
         h, e = row[MOMENTUM], row[ATTITUDE_ERROR]
         line = np.polynomial.Polynomial.fit(h.seconds, h.values, 1).convert().coef
-        held = J[j, j] * law.kd_per_s * law.kp_per_s * float(np.mean(e.values))
+        held = _stiffness(law, J, j) * float(np.mean(e.values))
         beside[j] = -line[1] - held
     return float(np.linalg.norm(beside)), float(np.linalg.norm(beside - turn.mean(axis=0)))

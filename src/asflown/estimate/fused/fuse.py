@@ -34,7 +34,7 @@ from .gather import CannotFuse, Record, gather, needed
 from .held_body import HeldBody
 from .innovations import Innovations, by_channel, considered_doubts, innovation_doubts
 from .levels import AxisFit, fit_doubts, fit_levels, unfitted
-from .series import MOMENTUM
+from .series import ATTITUDE_ERROR
 from .smooth_torque import gaussian_torque, widened
 from .turning import COMMAND_SMOOTHED, CommandNotKnown, check_turn
 
@@ -172,9 +172,8 @@ class _Coupling:
         counts = size > _COUNTS * size.max(initial=0.0)
         torques = (left * size)[:, counts].T
         moved = [axis.response(np.interp(axis.times.seconds, grid.seconds, c)) for c in torques]
-        if self.beside_Nm[j] > 0:  # in the momentum as well as in the torque: hardly any of it is in the sum
-            wheels = np.where(axis.channel == MOMENTUM, axis.measured_s - axis.start_s, 0.0)
-            moved.append(self.beside_Nm[j] * (wheels - axis.response(np.ones(len(axis.times.seconds)))))
+        if self.beside_Nm[j] > 0 and isinstance(axis.body, HeldBody):
+            moved.append(np.where(axis.channel == ATTITUDE_ERROR, self.beside_Nm[j] / axis.body.stiffness_Nm, 0.0))
         return np.column_stack(moved) if moved else axis.columns
 
 
@@ -232,7 +231,7 @@ def _fused(
     I_B, grid = subject.known_inertia(), record.grid
     prior = prior or "edges"
     bodies = {j: _body(subject, record, j, wiener=prior == "wiener") for j in record.series}
-    whole, still = len(bodies) == 3, record.loop == "modelled" and record.command is None
+    whole, still = len(bodies) == 3, record.still
     if still:  # a turn that counts is seen before the levels are fitted, and need not be fitted twice
         _check_turn(record, _motion(bodies, {j: unfitted(bodies[j], record.series[j]) for j in bodies}, record), I_B)
     fits = {j: fit_levels(bodies[j], record.series[j]) for j in bodies}
@@ -271,7 +270,7 @@ def _check_turn(record: Record, motion: _Motion, I_B: np.ndarray) -> None:
 
 
 def _followed(command: Command | None) -> dict:
-    if command is None:
+    if command is None or command.still:
         return {}
     fed = {"gyroscopic": command.gyroscopic, "acceleration": command.acceleration_fed}
     return {"command": command.source, "feed_forward": fed}
@@ -333,7 +332,7 @@ def _carried(subject: Subject, axes, record: Record, motion: _Motion, fits: dict
 
     again = {
         j: series[-1]
-        for j, series in gather(subject, axes, record.loop, stored, follow=record.command is not None).series.items()
+        for j, series in gather(subject, axes, record.loop, stored, follow=record.loop == "modelled" and not record.still).series.items()
     }
     return {
         j: replace(f, series=tuple(again[j] if s.row == again[j].row else s for s in f.series)) for j, f in fits.items()

@@ -14,7 +14,7 @@ from ...kit.errors import BadInput, some_of
 from ...kit.timeline import NS
 from ...telemetry.channels import AXES
 from ..subject import GAPS_BRIDGED, Grid, Subject, actuators, gap_doubts, gaps_on_grid, grid_for, splined
-from .command import Command, command_of, errors_from_quaternions, has_attitudes, has_command
+from .command import Command, command_of, errors_from_quaternions, has_attitudes, has_command, hold_of
 from .series import ATTITUDE_ERROR, BODY_RATE, CONTROL_TORQUE, MOMENTUM, Series
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class Record:
     ``loop``: whether the controller is modelled, or the actuators' action only measured; ``pushed``: they are
     known by their torque, not their momentum; ``start_Nms``: their momentum (3,), taken off the series;
     ``together``: whether all actuators are read at the same instants; ``command``: the motion taken off the series of a
-    modelled loop, where the craft is commanded to move."""
+    modelled loop, where the craft is commanded to move or its actuators do something beside the law."""
 
     grid: Grid
     loop: str
@@ -70,6 +70,11 @@ class Record:
     together: bool
     doubts: Doubts
     command: Command | None = None
+
+    @property
+    def still(self) -> bool:
+        """Whether the craft is modelled as holding a fixed attitude."""
+        return self.loop == "modelled" and (self.command is None or self.command.still)
 
 
 def gather(
@@ -117,6 +122,9 @@ def gather(
         and (follow or has_command(subject) or not subject.controller().tracking)
     ):
         command = command_of(subject, grid, series, (momentum.seconds, momentum.values_Nms))
+    elif loop == "modelled":
+        command = hold_of(subject, grid, series)
+    if command is not None:
         series = command.taken_off(series)
     silent = {g: c.name for c in everything for g in gaps_on_grid(c, grid)}
     carried = None if momentum.together or stored_Nms is not None else WHEELS_CARRIED()

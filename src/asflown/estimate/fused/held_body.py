@@ -80,6 +80,11 @@ class HeldBody(Body):
         )  # fmt: skip
 
     @property
+    def stiffness_Nm(self) -> float:
+        """The torque of a turn of one radian off the attitude held."""
+        return self.inertia_kgm2 * self.kd_per_s * self.kp_per_s
+
+    @property
     def late_s(self) -> float:
         """Delay of the rate that the controller sees: of the filter's cascade it is 4 z / w."""
         return 4 * self.filter_damping / self.filter_rad_s + self.delay_s
