@@ -2,6 +2,7 @@
 
 from .branches import branch_change, other_branch, undescribed
 from .chains import Chain, Nuisance, Parameter, Source, momentum_chain
+from .clock import check_clock
 from .counters import Counters, check_thrusters, control_step_s, counters_of, step_of
 from .firings import Firings, firings_of
 from .impulse import THRUST_SHARE, Gained, gained
@@ -11,7 +12,7 @@ from .valve import valve_of
 
 __all__ = [
     "CENTER_SIGMA", "PULSES", "THRUST_SHARE", "Chain", "Counters", "Firings", "Gained", "Nuisance", "Parameter", "Priors",
-    "Source", "branch_change", "center_doubts", "check_thrusters", "control_step_s", "counters_of", "firings_of", "gained",
+    "Source", "branch_change", "center_doubts", "check_clock", "check_thrusters", "control_step_s", "counters_of", "firings_of", "gained",
     "gained_idle", "momentum_chain", "other_branch", "pulse_Nms", "step_of", "thrust_priors", "uncounted", "undescribed",
     "valve_of",
 ]  # fmt: skip

@@ -11,6 +11,7 @@ import numpy as np
 from ...kit.doubts import Doubt, Kind, Severity
 from ...kit.errors import BadInput, some_of
 from ...kit.timeline import NS
+from .clock import check_clock, check_counts, check_pulses
 from .pulse_counts import Guess, guess_pulses
 from .pulse_lengths import Lengths, lengths_of, weak_because_lasting
 
@@ -131,6 +132,7 @@ def counters_of(subject: Subject) -> tuple[tuple[Thruster, ...], Counters, list[
     _check_complete(tlm, names)
     fires = [n for n in names if np.ptp(tlm.channel(f"on_time_{n}").usable.values) > 0]
     uncounted = [n for n in fires if f"pulse_count_{n}" not in tlm]
+    check_counts(tlm, [n for n in fires if n not in uncounted])
     both = [f"on_time_{n}" for n in names] + [f"pulse_count_{n}" for n in fires if not uncounted]
     tai_ns, values, loose = _common(tlm, both)
     on, loose = values[:, : len(names)], loose[:, : len(names)]
@@ -143,6 +145,9 @@ def counters_of(subject: Subject) -> tuple[tuple[Thruster, ...], Counters, list[
             remedy="Take a record of a wheel biasing, a run-down under thruster control or a burn.",
         )
     step_s = step_of(craft, on)
+    fast, too_fast = check_clock(steps, tai_ns, control_step_s(craft), names, tlm)
+    doubts += too_fast
+    steps, broken = np.where(fast[:, None], 0.0, steps), broken | fast
     guess = guess_pulses(steps, np.diff(tai_ns) / NS, step_s)
     if uncounted:
         number, sigma = float(guess.pulses.sum()), float(guess.spread.sum())
@@ -152,6 +157,8 @@ def counters_of(subject: Subject) -> tuple[tuple[Thruster, ...], Counters, list[
         counts[:, [names.index(n) for n in fires]] = values[:, len(names) :]
         pulses, also = _rises(counts)
         doubts += _falls(counts, "pulse count", names, tlm, tai_ns)
+        pulses = np.where(fast[:, None], 0.0, pulses)
+        doubts += check_pulses(steps, pulses, np.diff(tai_ns) / NS, step_s, craft.thrusters, tlm)
         guess, broken = Guess(pulses, np.zeros_like(pulses), np.zeros_like(pulses)), broken | also
     on_time, pulses, spread, chance = (
         np.vstack([np.zeros(len(names)), np.cumsum(v, axis=0)])

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...kit.doubts import Doubt, Kind, Severity
+from .course import course_doubts
 from .robust import FREEDOM
 from .terms import sigmas_of
 
@@ -97,6 +98,7 @@ def doubts_of(
         if part.known:
             yield from _of_sigmas(part, likelihood)
             yield _of_biases(part, model)
+    yield from course_doubts(m, parts)
     yield from _of_likelihood(m, likelihood, parts)
     if prior is not None:
         yield from _of_prior(prior.name or "an earlier model", parts)

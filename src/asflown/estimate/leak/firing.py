@@ -21,7 +21,7 @@ from ...kit.doubts import Doubts, Kind, Severity
 from ...kit.errors import BadInput
 from ...kit.timeline import NS
 from ...telemetry.attitude import together
-from ..firing import control_step_s
+from ..firing import check_clock, control_step_s
 
 if TYPE_CHECKING:
     from ...craft.model import Craft
@@ -138,7 +138,7 @@ class Firing:
 def firing_of(tlm: Telemetry, geometry: Geometry, thrust_N: float) -> Firing:
     """Counters of every thruster, as impulses of a steady thrust.
 
-    Raises BadInput for on-times never known together."""
+    Raises BadInput for on-times never known together, or faster than the clock."""
     timed = [n for n in geometry.names if f"on_time_{n}" in tlm]
     j, doubts = len(geometry.names), []
     if not timed:
@@ -150,12 +150,12 @@ def firing_of(tlm: Telemetry, geometry: Geometry, thrust_N: float) -> Firing:
         doubts.append(ON_TIMES_MISSING(thrusters=missing))
     tai_ns, on, counts, counted = _readings(tlm, geometry, timed)
     used, interval = np.diff(on, axis=0), np.diff(tai_ns)[:, None] / NS
+    fast, too_fast = check_clock(used, tai_ns, geometry.shortest_s, geometry.names, tlm)
+    doubts += too_fast
     # pulses where they are not counted: runs of cycles on, cycles being on by chance as often as the on-time says
     pulses = np.maximum(used / geometry.shortest_s * (1 - used / interval), 0.0)
     pulses[:, counted] = np.diff(counts[:, counted], axis=0)
-    broken = (
-        (used < 0).any(axis=1) | (used > 1.05 * interval + geometry.shortest_s).any(axis=1) | (pulses < 0).any(axis=1)
-    )
+    broken = (used < 0).any(axis=1) | fast | (pulses < 0).any(axis=1)
     if broken.any():
         first = tlm.describe_time(int(tai_ns[1:][broken][0]))
         doubts.append(COUNTERS_JUMP(jumps=int(broken.sum()), first=first))

@@ -81,6 +81,30 @@ RECORDS_APART = Kind(
 OLD_PREDICTION = Kind(
     "thrust.old-prediction", Severity.CAUTION, "the predicted thrust is the last one known, of {date}: it has fallen since",
 )  # fmt: skip
+#: What a wrong unit makes of the thrust: the factor, and the units.
+_SLIPS = {
+    1e-3: "on-times in ms labelled s, or thrusters' places in mm labelled m",
+    1e3: "on-times in s labelled ms",
+    1 / 60: "on-times in s labelled min",
+    60.0: "on-times in min labelled s",
+    0.3048: "thrusters' places in ft labelled m",
+    0.0254: "thrusters' places in inches labelled m",
+    60 / (2 * np.pi): "wheel rates in rpm labelled rad/s",
+    2 * np.pi / 60: "wheel rates in rad/s labelled rpm",
+    1 / (2 * np.pi): "wheel rates in rev/s labelled rad/s",
+    180 / np.pi: "wheel rates in deg/s labelled rad/s",
+    4.448: "a thrust in lbf labelled N in the craft file",
+}
+#: A slip is named where the ratio is that close to its factor.
+_CLOSE = 1.25
+#: A tank that blows down or is recharged does not bring the thrust further from all that the craft file knows; assumed.
+_BEYOND = 2.0
+#: Sigmas of prior and fit together beyond which what is taken beforehand is contradicted: a prior's sigma is itself only assumed.
+_STRAINED = 4.0
+#: A thruster that differs from the mean of the others by this share, and by so many sigmas, is one whose on-times may be wrong.
+_ALONE, _ALONE_SIGMAS = 0.4, 4.0
+
+_CHECK = "Check units and names of the on-times, the wheels' rates and spin inertia, inertia and centre of mass."
 _OFF = "the mean is {percent:+.0f} % from the predicted {predicted_N:.3g} N, whose sigma is assumed to be {share_percent:.0f} %: "
 OFF_PREDICTION = Kind(
     "thrust.off-prediction", Severity.SUSPECT,
@@ -88,15 +112,38 @@ OFF_PREDICTION = Kind(
     "Check which branch was in use.",
 )  # fmt: skip
 FAR_FROM_PREDICTION = Kind(
-    "thrust.far-from-prediction", Severity.SUSPECT, _OFF + "neither blow-down nor the other branch explains so much",
-    "Check units and names of the on-times, inertia and centre of mass.",
+    "thrust.far-from-prediction", Severity.SUSPECT, _OFF + "neither blow-down nor the other branch explains so much{guess}",
+    _CHECK,
+)  # fmt: skip
+BEYOND_THE_FILE = Kind(
+    "thrust.beyond-the-craft-file", Severity.SUSPECT,
+    "the mean is {ratio:.3g} times the {known_N:.3g} N of the craft file: neither blow-down nor a recharge explains so much{guess}", _CHECK,
+)  # fmt: skip
+NOTHING_KNOWN = Kind(
+    "thrust.nothing-known", Severity.VOID,
+    "the sigma of the mean, {sigma_N:.3g} N, is as large as the mean: the record does not say what the thrust is, or contradicts what "
+    "is taken as known", _CHECK,
+)  # fmt: skip
+PRIOR_CONTRADICTED = Kind(
+    "thrust.prior-contradicted", Severity.SUSPECT,
+    "the {what} comes out as {found}, {sigmas:.0f} sigma from what was taken beforehand ({taken}): the fit moved it to explain what "
+    "something else makes, or the value taken is wrong",
+    "Check the craft file and the options that give it, and names and units of on-times and pulse counts.",
+)  # fmt: skip
+UNLIKE_OTHERS = Kind(
+    "thrust.unlike-others", Severity.SUSPECT,
+    "{thruster} comes out at {ratio:.2f} ± {ratio_sigma:.2f} times the mean: a weak thruster, or on-times that are under a wrong name, "
+    "not counted or in another unit",
+    "Check that every column of on-times is that of its thruster, and none is empty or zero.",
 )  # fmt: skip
 
 
 def joint_doubts(fit: Fit, priors: Priors, records: list[Firings]) -> Iterable[Doubt]:
     """Of the joint method."""
     mean, sigma = fit.mean()
-    if sigma > _HARDLY * abs(mean):
+    if sigma > abs(mean):
+        yield NOTHING_KNOWN(sigma_N=sigma)
+    elif sigma > _HARDLY * abs(mean):
         yield HARDLY_KNOWN(percent=100 * sigma / abs(mean))
     correlation = fit.correlation(fit.mean_weights, FALL_TIME)
     if abs(correlation) > _TIED:
@@ -113,10 +160,32 @@ def joint_doubts(fit: Fit, priors: Priors, records: list[Firings]) -> Iterable[D
     for axis, center, before in zip(AXES, CENTER, priors.center_sigma_m, strict=True):
         if fit.sigma(center) > _UNTOLD * before:
             yield CENTER_BY_PRIOR(axis=axis)
+    yield from _against_priors(fit, priors)
     if fit.widened > _WIDENED:
         yield MISFIT(ratio=float(np.sqrt(fit.misfit)))
         for f in records:
             yield from stopped(f.subject)
+
+
+def _against_priors(fit: Fit, priors: Priors) -> Iterable[Doubt]:
+    """What the fit moved further than what is known beforehand lets it, and thrusters far from the others."""
+    taken = [("fall time", FALL_TIME, priors.fall_s, priors.fall_sigma_s, 1e3, "ms")]
+    taken += [
+        (f"centre of mass along {axis}", p, x, sigma, 1.0, "m")
+        for axis, p, x, sigma in zip(AXES, CENTER, priors.center_m, priors.center_sigma_m, strict=True)
+    ]
+    for what, parameter, before, before_sigma, scale, unit in taken:
+        found, sigma = fit.value(parameter), fit.sigma(parameter)
+        apart = abs(found - before) / np.hypot(before_sigma, sigma)
+        if apart > _STRAINED:
+            yield PRIOR_CONTRADICTED(
+                what=what, found=f"{scale * found:.3g} {unit}", sigmas=float(apart),
+                taken=f"{scale * before:.3g} ± {scale * before_sigma:.2g} {unit}",
+            )  # fmt: skip
+    for n in fit.fired if len(fit.fired) > 1 else ():
+        ratio, sigma = fit.over_mean(n)
+        if abs(ratio - 1) > max(_ALONE, _ALONE_SIGMAS * abs(sigma)):
+            yield UNLIKE_OTHERS(thruster=n, ratio=ratio, ratio_sigma=abs(sigma))
 
 
 def doubts_of(records: list[Firings]) -> list[Doubt]:
@@ -128,22 +197,43 @@ def doubts_of(records: list[Firings]) -> list[Doubt]:
     ]  # fmt: skip
 
 
-def doubts_of_dates(telemetry: list[Telemetry], craft: Craft, mean_N: float, sigma_N: float | None) -> Iterable[Doubt]:
-    """What the dates of the records say against one thrust, or against the one predicted."""
+def prediction_doubts(
+    telemetry: list[Telemetry], craft: Craft, mean_N: float, sigma_N: float | None
+) -> Iterable[Doubt]:
+    """What dates and craft file say against the mean thrust; ``sigma_N`` None: the method gives none."""
     dated_ns = [t.epoch_ns for t in telemetry if t.dated]
-    if not dated_ns:
-        return
-    apart_days = (max(dated_ns) - min(dated_ns)) / NS / 86_400
+    apart_days = (max(dated_ns) - min(dated_ns)) / NS / 86_400 if dated_ns else 0.0
     if apart_days > _APART_DAYS:
         yield RECORDS_APART(days=apart_days)
-    if not craft.thrust_history:
-        return
-    predicted = craft.thrust_at(dated_ns[0])
-    last = max(h.date for h in craft.thrust_history)
-    if dated_ns[0] - last > STALE_NS:
+    last = max((h.date for h in craft.thrust_history), default=None)
+    fresh = last is not None and dated_ns and dated_ns[0] - last <= STALE_NS
+    if last is not None and dated_ns and not fresh:
         yield OLD_PREDICTION(date=utc_label(last)[:10])
-    elif sigma_N is not None:
-        off, expected = mean_N - predicted, np.hypot(sigma_N, _PREDICTED_SHARE * predicted)
-        if abs(off) > 2 * expected:
-            kind = FAR_FROM_PREDICTION if abs(off) > _NO_BRANCH * predicted else OFF_PREDICTION
-            yield kind(percent=100 * off / predicted, predicted_N=predicted, share_percent=100 * _PREDICTED_SHARE)
+    far = _off_prediction(mean_N, sigma_N or 0.0, craft.thrust_at(dated_ns[0])) if fresh else None
+    yield from [d for d in (far or _beyond_the_file(craft, mean_N, sigma_N or 0.0),) if d is not None]
+
+
+def _off_prediction(mean_N: float, sigma_N: float, predicted_N: float) -> Doubt | None:
+    off, expected = mean_N - predicted_N, np.hypot(sigma_N, _PREDICTED_SHARE * predicted_N)
+    if abs(off) <= 2 * expected:
+        return None
+    told = {"percent": 100 * off / predicted_N, "predicted_N": predicted_N, "share_percent": 100 * _PREDICTED_SHARE}
+    if abs(off) > _NO_BRANCH * predicted_N:
+        return FAR_FROM_PREDICTION(**told, guess=_guess(mean_N / predicted_N))
+    return OFF_PREDICTION(**told)
+
+
+def _beyond_the_file(craft: Craft, mean_N: float, sigma_N: float) -> Doubt | None:
+    """Where the mean is further from all thrusts that the craft file knows, nominal ones included, than any tank brings it."""
+    known = [h.thrust for h in craft.thrust_history] + [t.nominal_thrust for t in craft.thrusters]
+    near = min(known, key=lambda k: abs(np.log(max(mean_N, 1e-300) / k)))
+    ratio = mean_N / near
+    if 1 / _BEYOND <= ratio <= _BEYOND or sigma_N > abs(mean_N - near):
+        return None
+    return BEYOND_THE_FILE(ratio=ratio, known_N=near, guess=_guess(ratio))
+
+
+def _guess(ratio: float) -> str:
+    """': are the on-times in ms labelled s?' where a wrong unit makes such a ratio, else ''."""
+    slips = [what for factor, what in _SLIPS.items() if 1 / _CLOSE < ratio / factor < _CLOSE]
+    return f": {' or '.join(slips)}?" if slips else ""

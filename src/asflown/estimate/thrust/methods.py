@@ -10,6 +10,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ...dynamics.pulses import VARIANTS
 from ...kit.doubts import Doubts
 from ...kit.errors import BadInput, check_choice
@@ -17,7 +19,7 @@ from ...kit.result import recorded
 from ...telemetry.telemetry import Telemetry
 from ..firing import thrust_priors
 from ..subject import subject_of
-from .doubts import doubts_of_dates
+from .doubts import prediction_doubts
 from .joint import joint
 from .papers import accelerometer_result, printed_result
 
@@ -75,7 +77,8 @@ def thrust(
     Raises
     ------
     BadInput
-        Where no thruster fires, names or counters do not fit the craft, or channels are missing.
+        Where no thruster fires, names or counters do not fit the craft, or channels are missing, and where the thrust comes
+        out negative.
     """
     check_choice(method, METHODS, "method")
     check_choice(variant, VARIANTS, "variant")
@@ -91,7 +94,20 @@ def thrust(
         done = joint(subjects, known)
     else:
         done = (printed_result if method == "printed" else accelerometer_result)(subjects, variant, known)
+    _check_thrust(done)
     dated = [t for t in records if t.dated]
     predicted = craft.thrust_at(dated[0].epoch_ns) if dated and craft.thrust_history else None
-    found = doubts_of_dates(records, craft, done.mean_thrust_N, done.mean_thrust_sigma_N)
+    found = prediction_doubts(records, craft, done.mean_thrust_N, done.mean_thrust_sigma_N)
     return replace(done, predicted_thrust_N=predicted, doubts=done.doubts + Doubts(found))
+
+
+def _check_thrust(done: ThrustResult) -> None:
+    """Raises BadInput for a thrust that cannot be: negative beyond its sigma, or no number."""
+    mean, sigma = done.mean_thrust_N, done.mean_thrust_sigma_N or 0.0
+    if np.isfinite(mean) and np.isfinite(sigma) and mean > -2 * sigma:
+        return
+    came = f"comes out negative ({mean:.3g} N)" if np.isfinite(mean) and mean < 0 else "is not determined by this record"
+    raise BadInput(
+        f"the mean thrust {came}: momentum and firings contradict each other",
+        remedy="Check the sense of the wheels' rates and axes, the thrusters' directions, and names and units of the on-times.",
+    )
