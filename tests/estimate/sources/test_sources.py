@@ -37,7 +37,7 @@ def within(result, flight):
 @pytest.mark.parametrize("seed", [3, 8])
 def test_recovery_of_dipole_and_levers(seed):
     result, flight = found(seed), flown(seed)[0]
-    assert set(result.found) == {"dipole", "sunlight", "drag"} and result.doubts.has(NO_CONSTANT)
+    assert result.constant_chance < 0.3 and result.doubts.has(NO_CONSTANT)
     assert all(all(axes) for axes in within(result, flight).values())
     half = 0.5 * np.diff(result.found["dipole"].ci95, axis=1)
     assert half.max() < 0.15
@@ -48,7 +48,7 @@ def test_recovery_of_a_constant_torque_that_is_there():
     flight = replace(drawn(5), constant=np.array([6e-6, 0.0, 0.0]))
     tlm, craft_, _ = fly(flight)
     result = sources(tlm, craft_)
-    assert "constant" in result.found
+    assert result.constant_chance > 0.5 and not result.doubts.has(NO_CONSTANT)
     assert all(all(axes) for axes in within(result, flight).values())
 
 

@@ -50,9 +50,9 @@ STEPS = Kind(
 )  # fmt: skip
 NO_CONSTANT = Kind(
     "sources.no-constant", Severity.CAUTION,
-    "a constant torque is left out: it would explain no more than chance does (p = {p_value:.2g}). With one, {what} would be known "
+    "no constant torque shows; one has a chance of {percent:.0f} %, which the intervals hold. Where one acts all the same, {what} is known "
     "{factor:.0f} times worse",
-    "Give --sources with constant to have it in.",
+    "Where a constant torque is known to act (outgassing, a leak), give --sources with constant.",
 )  # fmt: skip
 SIMPLER = Kind(
     "sources.simpler", Severity.NOTE,

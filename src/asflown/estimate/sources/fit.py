@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy
 
 from ...kit.doubts import Doubt, Doubts
 from ...kit.errors import BadInput, check_choice
@@ -16,7 +15,7 @@ from .doubts import NO_CONSTANT, NO_SOURCE, fit_doubts
 from .gather import ALONE, DENSITY, Arc, gather, with_harmonics
 from .residual import residual_of
 from .result import Fitted, SourcesResult
-from .swing import Posterior, posterior
+from .swing import Averaged, Posterior, averaged, posterior
 from .untold import Told, untold_in, words
 from .whitened import Whitened, whitened
 
@@ -29,8 +28,8 @@ if TYPE_CHECKING:
     from ..subject import Subject
 
 SOURCES = ("dipole", "sunlight", "drag", "constant")
-#: A constant torque is in the model where it explains more than chance would in one record of twenty (likelihood ratio).
-_BY_CHANCE = 0.05
+#: A constant torque shows from this chance on; one that does not is spoken of where it would make something known so many times worse.
+_SHOWS, _WORSE = 0.5, 2.0
 #: Rounds in which the density's harmonics follow the lever, and cells of the swing's grid in them.
 _ROUNDS, _CELLS = 3, 16
 #: A component is told where the data leave less than this share of what was open before.
@@ -56,8 +55,8 @@ def sources(
     craft : Craft
         Inertia, wheels; ``orbit`` where the telemetry has no positions.
     which : sequence of str, optional
-        Sources looked for, of 'dipole', 'sunlight', 'drag', 'constant'; by default all whose vectors are known, the constant torque
-        only where the record asks for it (likelihood ratio, p < 0.05).
+        Sources looked for, of 'dipole', 'sunlight', 'drag', 'constant'; by default all whose vectors are known, with a constant
+        torque of unknown size, which may be next to none; where 'constant' is named, one acts.
     without : sequence of str
         Sources left out.
     air : Air, optional
@@ -93,10 +92,8 @@ def sources(
         )
     white = _whitened(arc, fitted, modelled=air is not None)
     models = compare(white, fitted)
-    chosen: list[Doubt] = []
-    if which is None and "constant" in fitted:
-        fitted, chosen = _needed(white, models, fitted)
-    return _result(subject, white, fitted, models, asked, chosen)
+    average = averaged(white, fitted) if which is None and "constant" in fitted else None
+    return _result(subject, white, average, fitted, models, asked)
 
 
 def _whitened(arc: Arc, fitted: tuple[str, ...], *, modelled: bool) -> Whitened:
@@ -117,18 +114,21 @@ def _whitened(arc: Arc, fitted: tuple[str, ...], *, modelled: bool) -> Whitened:
 
 
 def _result(
-    subject: Subject, white: Whitened, fitted: tuple[str, ...], models: tuple[Model, ...], asked: tuple[str, ...],
-    chosen: list[Doubt],
+    subject: Subject, white: Whitened, average: Averaged | None, fitted: tuple[str, ...], models: tuple[Model, ...],
+    asked: tuple[str, ...],
 ) -> SourcesResult:  # fmt: skip
     arc, around = white.arc, white.arc.environment
-    found = posterior(white, fitted)
+    found = posterior(white, fitted) if average is None else average.whole
+    shown = fitted
+    if average is not None and average.chance < _SHOWS:
+        shown = tuple(n for n in fitted if n != "constant")
     told = _told(arc, found)
     theta = found.whole(white)
     residual = residual_of(white, theta)
     left_out = {n: w for n, w in around.left_out.items() if n in asked or n == "gravity-gradient"}
     doubts = [
-        *subject.doubts, *arc.doubts, *(NO_SOURCE(source=n, needs=w) for n, w in left_out.items()), *chosen,
-        *fit_doubts(white, theta, residual, models, fitted, relative=subject.relative),
+        *subject.doubts, *arc.doubts, *(NO_SOURCE(source=n, needs=w) for n, w in left_out.items()), *_constant(average, arc),
+        *fit_doubts(white, theta, residual, models, shown, relative=subject.relative),
         PER_SPIN_INERTIA(what="the torque is") if subject.relative else None,
     ]  # fmt: skip
     return SourcesResult(
@@ -137,6 +137,7 @@ def _result(
         method="momentum",
         found={n: _fitted(arc, found, told, n) for n in fitted},
         inertia=_fitted(arc, found, told, "inertia") if arc.of("inertia").any() else None,
+        constant_chance=None if average is None else average.chance,
         swing=_swing(found) if "drag" in fitted else None,
         correlations=_correlations(arc, found),
         time_s=subject.telemetry.seconds(arc.tai_ns),
@@ -155,27 +156,20 @@ def _result(
     )
 
 
-def _needed(white: Whitened, models: tuple[Model, ...], fitted: tuple[str, ...]) -> tuple[tuple[str, ...], list[Doubt]]:
-    """The sources without the constant torque where it explains no more than chance would, and what that hides."""
-    without = tuple(n for n in fitted if n != "constant")
-    bic = {frozenset(m.sources): m.bic_above_best for m in models}
-    if not without:
-        return fitted, []
-    free = int(white.arc.of("constant").sum())
-    gain = bic[frozenset(without)] - bic[frozenset(fitted)] + free * np.log(white.kept.sum())
-    chance = float(scipy.special.chdtrc(free, gain))
-    if chance < _BY_CHANCE:
-        return fitted, []
-    names = white.arc.columns
-    kept = [
-        (int(c), k) for k, c in enumerate(np.flatnonzero(posterior(white, without).kept)) if names[c].source in without
-    ]
-    one, other = posterior(white, without), posterior(white, fitted)
-    place = {int(c): k for k, c in enumerate(np.flatnonzero(other.kept))}
-    with_it, without_it = np.diag(other.spread), np.diag(one.spread)
-    wider = [(np.sqrt(with_it[place[c]] / without_it[k]), names[c]) for c, k in kept]
-    factor, column = max(wider, key=lambda w: w[0])
-    return without, [NO_CONSTANT(p_value=chance, factor=float(factor), what=words(column))]
+def _constant(found: Averaged | None, arc: Arc) -> list[Doubt]:
+    """A doubt about a constant torque that does not show, and what it would hide."""
+    if found is None or found.chance > _SHOWS:
+        return []
+    names = [arc.columns[c] for c in np.flatnonzero(found.none.kept)]
+    worse = np.sqrt(np.diag(found.widest.spread) / np.diag(found.none.spread))
+    factor, column = max(
+        ((w, c) for w, c in zip(worse, names, strict=True) if c.source not in ("constant", "inertia")),
+        key=lambda of: of[0],
+        default=(1.0, None),
+    )
+    if column is None or factor < _WORSE:
+        return []
+    return [NO_CONSTANT(percent=100 * found.chance, factor=float(factor), what=words(column))]
 
 
 def _told(arc: Arc, found: Posterior) -> dict[int, Told]:

@@ -61,6 +61,9 @@ class SourcesRecord(TypedDict):
     drag_lever_ci95_Nm: Annotated[Intervals | None, Doc("three [low, high]")]
     constant_Nm: Annotated[Vector | None, Doc("constant torque in body axes")]
     constant_ci95_Nm: Annotated[Intervals | None, Doc("three [low, high]")]
+    constant_probability: Annotated[
+        Number | None, Doc("that a constant torque is more than next to none; null where it was asked for or left out")
+    ]
     inertia_correction: Annotated[
         InertiaSeenRecord | None, Doc("of the craft file's, as gravity gradient and turn see it")
     ]
@@ -116,7 +119,8 @@ class SourcesResult(Estimate):
     """Sources of the torque on a craft, body axes.
 
     ``found`` {name: Fitted}; ``inertia``: corrections of the craft's tensor; ``time_s`` (N,): from the epoch; ``contributions``
-    {name: (N, 3)} [N m]; ``lit``, ``phase_rad`` (N,) or None; ``size_Nm``: rms of the torque that is seen; ``untold``: sentences.
+    {name: (N, 3)} [N m]; ``lit``, ``phase_rad`` (N,) or None; ``size_Nm``: rms of the torque that is seen; ``untold``: sentences; ``constant_chance``: that
+    a constant torque is more than next to none, None where it was asked for or left out.
     All torques per unit spin inertia where ``relative``."""
 
     RECORD: ClassVar[type] = SourcesRecord
@@ -133,6 +137,7 @@ class SourcesResult(Estimate):
     size_Nm: float
     untold: tuple[str, ...]
     models: tuple[Model, ...]
+    constant_chance: float | None = None
     relative: bool = False
     where_from: dict[str, str] = field(default_factory=dict)
     left_out: dict[str, str] = field(default_factory=dict)
@@ -176,6 +181,7 @@ class SourcesResult(Estimate):
             "dipole_Am2": None if dipole is None else dipole.stated,
             "dipole_ci95_Am2": None if dipole is None else dipole.ci95,
             **in_torque,
+            "constant_probability": self.constant_chance,
             "inertia_correction": self._inertia(),
             "density_swing": self.swing,
             "correlations": self.correlations,
@@ -253,6 +259,8 @@ class SourcesResult(Estimate):
             remarks.append(
                 f"density swings by {100 * self.swing['amplitude']:.0f} ± {100 * self.swing['amplitude_sigma']:.0f} % over the orbit"
             )
+        if self.constant_chance is not None:
+            remarks.append(f"a constant torque acts with a probability of {100 * self.constant_chance:.0f} %")
         remarks += [f"{n}: {w}" for n, w in self.where_from.items()]
         return (*remarks, *self.untold)
 
