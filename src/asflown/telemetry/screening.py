@@ -14,7 +14,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import pdtrc
+import scipy
 
 from ..kit.scatter import MEDIAN_SIZE, difference_sigma
 from ..kit.timeline import NS, segments
@@ -368,7 +368,7 @@ def _without_repeats(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     starts, stops = starts[inside], stops[inside]
     alone = np.minimum(np.abs(change[starts - 1]), np.abs(change[stops])) > 3 * step
     starts, stops = starts[alone], stops[alone]
-    if len(starts) == 0 or pdtrc(len(starts) - 1, _zeros_by_chance(moves, step)) > CHANCE:
+    if len(starts) == 0 or scipy.special.pdtrc(len(starts) - 1, _zeros_by_chance(moves, step)) > CHANCE:
         return c, []
     edges = np.zeros(len(c.values) + 1, np.int64)
     edges[starts + 1] += 1
@@ -471,7 +471,7 @@ def _without_repeated_frames(channels: dict[str, Channel], steps: dict[str, floa
         starts, stops = _runs_of(whole)
         for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
             whole[start:stop] = start > 0 and stop < whole.size and stop - start < STUCK_RUN - 1
-        if not whole.any() or pdtrc(whole.sum() - 1, by_chance) > CHANCE:
+        if not whole.any() or scipy.special.pdtrc(whole.sum() - 1, by_chance) > CHANCE:
             continue
         hit = np.concatenate(([False], whole))
         for n in names:

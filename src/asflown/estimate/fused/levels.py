@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize
+import scipy
 
 from ...kit.doubts import Doubt, Kind, Severity
 from ...kit.smoother import log_likelihood, score, smooth
@@ -129,7 +129,7 @@ def _most_probable(body: Body, centre: Levels, start: Levels, series, known: Kno
         return -value + 0.5 * z @ z, z - spread * slope
 
     z = (start.logs() - middle) / spread
-    found = optimize.minimize(cost, z, method="L-BFGS-B", jac=True, bounds=[(-6.0, 6.0)] * len(z), options=_ENDS)
+    found = scipy.optimize.minimize(cost, z, method="L-BFGS-B", jac=True, bounds=[(-6.0, 6.0)] * len(z), options=_ENDS)
     return kind.from_logs(middle + spread * found.x)
 
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, ClassVar
 from ...kit.doubts import Doubts, Kind, Severity
 from ...kit.errors import BadInput, check_choice
 from ...telemetry.channels import AXES
-from ..fused import CannotFuse
 from .answer import VARIANTS, Answer, Method
 from .fused import Fused
 from .momentum import Momentum
@@ -45,6 +44,8 @@ class Automatic(Method):
     name: ClassVar[str] = "automatic"
 
     def estimate(self, subject: Subject, axes: tuple[int, ...]) -> Answer:
+        from ..fused import CannotFuse
+
         try:
             return Fused().estimate(subject, axes)
         except CannotFuse as why:

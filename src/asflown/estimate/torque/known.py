@@ -9,7 +9,6 @@ import numpy as np
 
 from ...kit.errors import BadInput, some_of
 from ...kit.timeline import NS
-from ..environment import NAMES, environment_of
 from .result import KnownTorque
 
 if TYPE_CHECKING:
@@ -28,6 +27,10 @@ _BELIEFS = {
 
 def check_known(names) -> tuple[str, ...]:
     """The names, each once, in the order of ``environment.NAMES``.  Raises BadInput for one that is no term."""
+    if not names:
+        return ()
+    from ..environment import NAMES  # the surroundings are loaded where one is asked for
+
     for name in names:
         if name not in NAMES:
             raise BadInput(f"{name!r} is no known torque", remedy=f"Give some of {some_of(NAMES)}.")
@@ -40,6 +43,8 @@ def without_known(
     """The result less some torques of the surroundings, whose uncertainty goes into its sigma and its drawn torques.
 
     Raises BadInput where one of them cannot be computed."""
+    from ..environment import environment_of
+
     tai_ns = subject.telemetry.epoch_ns + np.round(result.time_s * NS).astype(np.int64)
     environment = environment_of(subject, tai_ns, names, air)
     missing = [f"{name} needs {what}" for name, what in environment.left_out.items()]
