@@ -101,7 +101,7 @@ BAD = {
     "cut gzip": (gzip.compress(GOOD.encode())[:-20], "gzip"),
     "damaged gzip": (b"\x1f\x8b\x08" + bytes(60), "gzip"),
     "junk": (bytes(range(256)) * 9, "not a text table"),
-    "latin-1": ("time [s],temp °\n".encode("latin-1"), "not a text table"),
+    "latin-1 name": ("time [s],temp °\n".encode("latin-1"), "has no unit"),
     "open quote": (b'time [s],control_mode\n0,"RWA\n1,RCS\n', "cannot be read"),
 }
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
+import warnings
 from functools import cache
 
 from .errors import BadInput, some_of
@@ -25,11 +26,23 @@ _WRITTEN = {
     "mNm": "mN m", "uNm": "uN m", "µNm": "uN m", "μNm": "uN m", "nNm": "nN m", "Nms": "N m s", "mNms": "mN m s", "uNms": "uN m s",
     "Nm/A": "N m / A", "mNm/A": "mN m / A", "Am2": "A m2", "Am^2": "A m2", "mAm2": "mA m2", "gauss": "G", "Gauss": "G", "in": "inch",
     "lbs": "lb", "psia": "psi", "kgm2": "kg m2", "kgm^2": "kg m2", "kg*m^2": "kg m2", "ft/sec": "ft/s",
+    "rps": "rev/s", "krpm": "1000 rpm", "r.p.m.": "rpm", "U/min": "rpm", "DPS": "deg/s", "mdps": "mdeg/s", "kps": "km/s", "Nmsec": "N m s",
+    "Nm s": "N m s", "mNm s": "mN m s", "\"": "arcsec", "\"/s": "arcsec/s", "arc-sec": "arcsec", "mGauss": "mG", "ft-lb": "ft lbf",
+    "in-lb": "inch lbf", "in-lbf": "inch lbf", "in lbf": "inch lbf", "lbf-in": "inch lbf", "lbf in": "inch lbf", "oz-in": "ozf inch",
+    "in-oz": "ozf inch", "ft-lb-s": "ft lbf s",
 }  # fmt: skip
-_WORDS = {
-    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "usec": "us", "degree": "deg", "degrees": "deg",
-    "radian": "rad", "radians": "rad", "rads": "rad", "minute": "min", "minutes": "min", "hour": "h", "hours": "h", "hr": "h",
-    "volt": "V", "volts": "V", "amp": "A", "amps": "A", "meter": "m", "meters": "m", "metre": "m", "metres": "m",
+#: Units of time as people write them.
+TIME_WORDS = {
+    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "msecs": "ms", "millisecond": "ms", "milliseconds": "ms",
+    "µs": "us", "μs": "us", "usec": "us", "usecs": "us", "microsecond": "us", "microseconds": "us", "nsec": "ns", "nanosecond": "ns",
+    "nanoseconds": "ns", "minute": "min", "minutes": "min", "mins": "min", "hour": "h", "hours": "h", "hr": "h", "hrs": "h", "day": "d",
+    "days": "d",
+}  # fmt: skip
+_WORDS = TIME_WORDS | {
+    "degree": "deg", "degrees": "deg", "degs": "deg", "radian": "rad", "radians": "rad", "rads": "rad",
+    "volt": "V", "volts": "V", "amp": "A", "amps": "A", "ampere": "A", "amperes": "A", "meter": "m", "meters": "m", "metre": "m",
+    "metres": "m", "rot": "rev", "rotation": "rev", "rotations": "rev", "revolution": "rev", "revolutions": "rev", "turns": "rev",
+    "per": "/", "newton": "N", "newtons": "N", "kelvin": "K", "pascal": "Pa", "pascals": "Pa", "tesla": "T", "hertz": "Hz",
 }  # fmt: skip
 _KNOWN = (
     "rad/s", "deg/s", "rpm", "mrad", "urad", "rad", "deg", "arcsec", "N m", "mN m", "uN m", "N m s", "mN m s", "kg m2", "N", "mN", "s", "ms",
@@ -44,12 +57,37 @@ def _units():
 
     rpm = u.def_unit("rpm", 2 * 3.141592653589793 / 60 * u.rad / u.s)
     rev = u.def_unit(["rev", "turn"], 2 * 3.141592653589793 * u.rad)
+    ozf = u.def_unit("ozf", imperial.lbf / 16)
     percent = u.def_unit("%", 0.01 * u.dimensionless_unscaled)
     gauss = [u.def_unit("G", 1e-4 * u.T), u.def_unit("mG", 1e-7 * u.T)]
     u.add_enabled_units(
-        [rpm, rev, percent, *gauss, imperial.ft, imperial.inch, imperial.lb, imperial.lbf, imperial.psi]
+        [rpm, rev, ozf, percent, *gauss, imperial.ft, imperial.inch, imperial.lb, imperial.lbf, imperial.psi]
     )
     return u
+
+
+#: What stands for "dimensionless".
+_NO_UNIT = ("", "1", "-", "none", "count", "counts", "n/a", "na", "unitless", "dimensionless")
+_SIGNS = str.maketrans("²³⁴⁻¹·⋅×−", "234-1   -")
+
+
+def _spelled(name: str) -> str:
+    """A unit as people spell it, with signs and words as astropy has them."""
+
+    def word(found: re.Match) -> str:
+        said = found[0]
+        known = _WORDS.get(said) or (_WORDS.get(said.lower()) if len(said) > 2 else None)
+        return known or (
+            said[:-1].lower() if len(said) > 5 and said.endswith("s") and said.lower() != "celsius" else said
+        )
+
+    plain = re.sub(r"(?<=[A-Za-z])-(?=[A-Za-z])", " ", name.translate(_SIGNS))  # N-m
+    return _WRITTEN.get(plain.replace(" ", "")) or re.sub(r"[A-Za-z]{1,20}", word, plain)
+
+
+def _raised(plain: str) -> str:
+    """'kg m2' -> 'kg m**2': an exponent without its caret."""
+    return re.sub(r"(?<=[a-zA-Z])(-?\d)", r"**\1", plain)
 
 
 @cache
@@ -57,12 +95,14 @@ def parse_unit(text: str):
     """The astropy unit that ``text`` names, also as people write it (RPM, deg/sec, Nms).  Raises BadInput for a unit it does not know."""
     u = _units()
     name = text.strip()
-    if name in ("", "1", "-", "none", "count", "counts"):
+    if name.lower() in _NO_UNIT:
         return u.dimensionless_unscaled
-    plain = _WRITTEN.get(name) or re.sub(r"[A-Za-z]{1,20}", lambda word: _WORDS.get(word[0], word[0]), name[:200])
-    for tried in (plain, re.sub(r"(?<=[a-zA-Z])(-?\d)", r"**\1", plain)):  # "kg m2": an exponent without its caret
+    plain = _WRITTEN.get(name) or _spelled(name[:200])
+    for tried in dict.fromkeys((plain, _raised(plain), _raised(plain.lower()))):  # "kg m2", "DEG/S"
         try:
-            return u.Unit(tried)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                return u.Unit(tried)
         except (ValueError, TypeError, ZeroDivisionError, OverflowError, RecursionError):
             continue
     near = difflib.get_close_matches(name, _KNOWN, 3, 0.6)

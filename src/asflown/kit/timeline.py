@@ -26,12 +26,30 @@ _MOST_DAYS = 92_000  # either way: 1748 to 2251; int64 nanoseconds end in 2292
 #: UTC begins in 1960; the axis ends in 2251.
 YEARS = range(1960, 2250)
 
-#: UTC as text: date (2015-09-29, 2015/09/29, 2015-272, 2015:272), time of day, and what says that it is UTC or how far off.
+#: UTC as text: date (2015-09-29, 2015/09/29, 29-Sep-2015, 2015 SEP 29, 20150929, 2015-272, 2015:272), time of day, and what says that it
+#: is UTC or how far off.
 _UTC = re.compile(
-    r"(?P<year>\d{4})(?:-(?P<month>\d\d?)-(?P<day>\d\d?)|/(?P<month2>\d\d?)/(?P<day2>\d\d?)|[-:]?(?P<of_year>\d{3}))"
-    r"(?:(?:[Tt ]|//|:)(?P<hour>\d\d?):(?P<minute>\d\d?)(?::(?P<second>\d\d?)(?:[.,](?P<rest>\d{0,20}))?)?)?"
-    r" ?(?P<zone>[Zz]|UTC|[+-]\d\d:?\d\d|[+-]\d\d)?",
+    r"(?:(?P<year>\d{4})(?:-(?P<month>\d\d?)-(?P<day>\d\d?)|/(?P<month2>\d\d?)/(?P<day2>\d\d?)|[-:/ ]?(?P<of_year>\d{3})"
+    r"|[- ](?P<called>[A-Za-z]{3,9})[- ](?P<day3>\d\d?))|(?P<day4>\d\d?)[- ](?P<called2>[A-Za-z]{3,9})[- ](?P<year2>\d{4})"
+    r"|(?P<year3>\d{4})(?P<month3>\d\d)(?P<day5>\d\d))"
+    r"(?:(?:[Tt _]|//?|:|(?<=\d{3})-)(?:(?P<hour>\d\d?):(?P<minute>\d\d?)(?::(?P<second>\d\d?)(?:[.,](?P<rest>\d{0,20}))?)?"
+    r"|(?P<hour2>\d\d)(?P<minute2>\d\d)(?P<second2>\d\d)(?:[.,](?P<rest2>\d{0,20}))?))?"
+    r" ?(?P<zone>[Zz]|UTC|GMT|[+-]\d\d:?\d\d|[+-]\d\d)?",
     re.ASCII,
+)
+_MONTHS = (
+    "january",
+    "february",
+    "march",
+    "april",
+    "may",
+    "june",
+    "july",
+    "august",
+    "september",
+    "october",
+    "november",
+    "december",
 )
 _LONGEST_STAMP = 64
 _REMEDY = "Write UTC as 2015-09-29T00:00:00 or, by day of year, 2015-272T00:00:00."
@@ -61,12 +79,16 @@ def _posix_ns(stamp) -> tuple[int, bool]:
     said = _UTC.fullmatch(text) if len(text) <= _LONGEST_STAMP else None
     if said is None:
         raise _no_time(text)
-    year = int(said["year"])
+    year = _year_of(said)
     if year not in YEARS:
         raise _no_time(text, f"the year {year} is outside {YEARS[0]} to {YEARS[-1]}")
+    timed = said["hour"] or said["hour2"]
+    if not timed and (said["year3"] or (said["zone"] or "Z")[0] in "+-"):
+        raise _no_time(text)  # a bare number, or what may be an hour or an offset
     day = _day_of(said, text)
-    hour, minute, second = (int(said[part] or 0) for part in ("hour", "minute", "second"))
-    rest = round(int(said["rest"]) * NS / 10 ** len(said["rest"])) if said["rest"] else 0
+    hour, minute, second = (int(said[part] or said[f"{part}2"] or 0) for part in ("hour", "minute", "second"))
+    digits = said["rest"] or said["rest2"]
+    rest = round(int(digits) * NS / 10 ** len(digits)) if digits else 0
     offset_s = _offset_s(said["zone"])
     if second == 60 and not ((hour, minute, offset_s) == (23, 59, 0) and _ends_with_leap_second(day)):
         raise _no_time(text, "there is no leap second then")
@@ -77,16 +99,24 @@ def _posix_ns(stamp) -> tuple[int, bool]:
     return seconds * NS + rest, second == 60
 
 
+def _year_of(said: re.Match) -> int:
+    return int(said["year"] or said["year2"] or said["year3"])
+
+
 def _day_of(said: re.Match, text: str) -> int:
     """Days since 1970-01-01 of the date that was written."""
-    year = int(said["year"])
+    year = _year_of(said)
     if said["of_year"]:
         start = date(year, 1, 1).toordinal() - _ORDINAL_1970
         length = 366 if isleap(year) else 365
         if not 1 <= int(said["of_year"]) <= length:
             raise _no_time(text, f"{year} has {length} days")
         return start + int(said["of_year"]) - 1
-    month, day = int(said["month"] or said["month2"]), int(said["day"] or said["day2"])
+    day = int(said["day"] or said["day2"] or said["day3"] or said["day4"] or said["day5"])
+    called = (said["called"] or said["called2"] or "").lower()
+    month = int(said["month"] or said["month2"] or said["month3"] or 0)
+    if called:  # 'Sep', 'Sept' and 'September'
+        month = 1 + next((k for k, name in enumerate(_MONTHS) if name.startswith(called)), -1)
     try:
         return date(year, month, day).toordinal() - _ORDINAL_1970
     except ValueError:

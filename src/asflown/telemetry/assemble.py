@@ -124,7 +124,7 @@ def channel_from(table: Table, use: Use, tai_ns: np.ndarray, findings: list[Find
             findings.append(Finding(use.name, "declared", len(declared), int(tai_ns[declared[0]]), detail))
         if len(said_nan):
             findings.append(
-                Finding(use.name, "nan", len(said_nan), int(tai_ns[said_nan[0]]), "cells contain 'nan' and count as blank")
+                Finding(use.name, "nan", len(said_nan), int(tai_ns[said_nan[0]]), "cells contain 'nan' or another word for no value and count as blank")
             )  # fmt: skip
     if len(rows) == 0:
         raise BadInput("the column has no values", channel=use.name, remedy="Remove the column, or add its data.")
@@ -132,23 +132,42 @@ def channel_from(table: Table, use: Use, tai_ns: np.ndarray, findings: list[Find
     return Channel(use.name, at, values, np.ones(len(rows), bool), use.unit, use.count_size, modulus=use.modulus)
 
 
-def time_scale(table: Table | TextFile) -> Scale:
-    """The scale of the first column of a table that describes itself.  Raises BadInput where it is not a time."""
-    first = split_header(table.headings[0]) or (table.headings[0].strip(), None)
-    if first[0].lower() != "time" or first[1] is None:
-        raise BadInput(
-            f"there is no time column: the first heading is {table.headings[0][:60]!r}",
-            remedy="The first column is 'time [s]', 'time [utc]', 'time [gps s]' or 'time [et s]'; "
-            "for any other table give a channel dictionary (--channels).",
-        )
-    scale = scale_called(first[1])
-    if scale is None:
-        raise BadInput(
-            f"the time scale [{first[1]}] is not known",
-            remedy="Write 'time [s]' (also ms, us, min, h, d), 'time [utc]', 'time [gps s]', 'time [et s]', 'time [unix s]', "
-            "'time [mjd]' or 'time [jd]'.",
-        )
-    return scale
+def time_column(table: Table | TextFile) -> tuple[int, Scale]:
+    """Where the times of a table that describes itself stand, and their scale: in its first column, or behind one of row numbers.
+
+    Raises BadInput where that is not a time."""
+    for column, heading in enumerate(table.headings[:2]):
+        name, unit = split_header(heading) or (heading.strip(), None)
+        known = _TIMES.get(name.lower().replace("_", " "))
+        if known is None and name.lower() in _ROW_NUMBERS and column == 0:
+            continue
+        if known is None:
+            break
+        unit = unit if unit is not None else known or ("utc" if table.begins_dated(column) else None)
+        if unit is None:
+            break
+        scale = scale_called(unit)
+        if scale is None:
+            raise BadInput(
+                f"the time scale [{unit}] is not known",
+                remedy="Write 'time [s]' (also ms, us, min, h, d), 'time [utc]', 'time [gps s]', 'time [et s]', 'time [unix s]', "
+                "'time [mjd]' or 'time [jd]'.",
+            )
+        return column, scale
+    raise BadInput(
+        f"there is no time column: the first heading is {table.headings[0][:60]!r}",
+        remedy="The first column is 'time [s]', 'time [utc]', 'time [gps s]' or 'time [et s]'; "
+        "for any other table give a channel dictionary (--channels).",
+    )
+
+
+#: What a column of times is called, and the scale that this says.
+_TIMES = {
+    "time": "", "timestamp": "", "t": "", "datetime": "", "date time": "", "utc": "utc", "time utc": "utc", "utc time": "utc",
+    "timestamp utc": "utc",
+}  # fmt: skip
+#: What a column of row numbers is called, as spreadsheets and pandas write it.
+_ROW_NUMBERS = ("", "index", "unnamed: 0", "row", "#")
 
 
 def assembled(parts: Sequence[Part], epoch: str | None, *, alone: bool = True) -> Read:

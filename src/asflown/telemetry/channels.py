@@ -132,14 +132,18 @@ def split_header(cell: str) -> tuple[str, str] | None:
     return None
 
 
+_CELSIUS = ("deg_C", "degC", "DegC", "deg C", "Deg C", "°C", "℃", "C", "celsius", "Celsius", "celcius")
+_FAHRENHEIT = ("deg_F", "degF", "DegF", "deg F", "Deg F", "°F", "℉", "F", "fahrenheit", "Fahrenheit")
+
+
 def to_si(name: str, unit: str) -> tuple[float, float]:
     """Factor and offset that bring a channel given in ``unit`` to its SI unit."""
     kind = kind_of(name)
     if kind.behaves == "state":
         return 1.0, 0.0
-    if kind.unit == "K" and unit in ("deg_C", "degC", "°C", "C", "celsius", "Celsius"):
+    if kind.unit == "K" and unit in _CELSIUS:
         return 1.0, 273.15
-    if kind.unit == "K" and unit in ("deg_F", "degF", "°F", "F", "fahrenheit", "Fahrenheit"):
+    if kind.unit == "K" and unit in _FAHRENHEIT:
         return 5 / 9, 273.15 - 32 * 5 / 9
     try:
         return si_factor(unit, kind.unit), 0.0

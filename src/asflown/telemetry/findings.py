@@ -101,7 +101,7 @@ OF_FINDING = {
                  "a counter decreases or a value jumps over its whole range {count} times{where}: an undeclared wrap or a reset?",
                  "Declare the wrap in a channel dictionary, or divide the record at the reset."),
     "norm": Kind("telemetry.norm", Severity.SUSPECT, "{count} quaternions do not have unit length; they were left out", _CHECK),
-    "nan": Kind("telemetry.nan", Severity.NOTE, "{count} cells contain 'nan'{where}; they count as blank"),
+    "nan": Kind("telemetry.nan", Severity.NOTE, "{count} cells contain 'nan' or another word for no value{where}; they count as blank"),
     "orbit": Kind("telemetry.no-orbit", Severity.CAUTION, "{count} quaternions were sampled while the orbit is not known; they were left out"),
 }  # fmt: skip
 

@@ -8,8 +8,9 @@ from pathlib import Path
 from ..kit.errors import BadInput, some_of
 from ..kit.files import sha256_of_file
 from ..kit.result import Input, inputs_of
-from .assemble import Clock, Part, Read, Use, assembled, time_scale
+from .assemble import Clock, Part, Read, Use, assembled, time_column
 from .channels import kind_of, split_header, to_si
+from .findings import Finding
 from .formats import BY_SIGNATURE
 from .tables import Table, divided, long_columns
 from .telemetry import Exclusion, Telemetry
@@ -129,16 +130,27 @@ def _self_described(tables: list[Table] | list[TextFile]) -> Read:
     """Channels from headings 'name [unit]' under a first column 'time [..]'."""
     whole: list[Table | TextFile] = []
     for table in tables:
-        time_scale(table)
         where = long_columns(table.headings)
-        whole += divided(table.whole(), 0, *where) if where else [table]
-    return assembled([Part(t, Clock((0,), time_scale(t)), *_headed(t)).parsed() for t in whole], None)
+        whole += divided(table.whole(), time_column(table)[0], *where) if where else [table]
+    parts = []
+    for table in whole:
+        at, scale = time_column(table)
+        parts.append(Part(table, Clock((at,), scale), *_headed(table, at)).parsed())
+    read = assembled(parts, None)
+    told = [f"the column {t.headings[0]!r} was taken for row numbers" for t in whole if time_column(t)[0]]
+    told += [
+        f"the times under {h!r} were read as UTC"
+        for t in tables
+        if "[" not in (h := t.headings[time_column(t)[0]]) and "(" not in h
+    ]
+    read.findings += [Finding("", "form", 1, read.epoch_ns, note) for note in dict.fromkeys(told)]
+    return read
 
 
-def _headed(table: Table | TextFile) -> tuple[list[Use], list[int]]:
-    """What each heading after the first names: a channel, or a further clock to keep."""
+def _headed(table: Table | TextFile, time: int) -> tuple[list[Use], list[int]]:
+    """What each heading after that of the time names: a channel, or a further clock to keep."""
     uses, clocks = [], []
-    for j, heading in enumerate(table.headings[1:], 1):
+    for j, heading in enumerate(table.headings[time + 1 :], time + 1):
         name, unit = split_header(heading) or (heading.strip(), None)
         if name.lower() in CLOCKS or (unit is not None and _is_clock(unit)):
             clocks.append(j)

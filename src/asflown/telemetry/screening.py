@@ -16,7 +16,7 @@ import scipy
 
 from ..kit.scatter import MEDIAN_SIZE, difference_sigma
 from ..kit.timeline import NS, segments
-from .channels import AXES, kind_of
+from .channels import AXES, kind_of, to_si
 from .findings import ERROR_TOO_FAST, IMPLAUSIBLE, NOT_UNIT, RATE_SCALE, Finding
 from .order import in_order
 from .telemetry import BRIDGED, Channel, Telemetry, common_instants
@@ -48,9 +48,12 @@ _NOT_UNIT = 0.1  # by which a unit vector's length may be off
 #: Quantities with a sign: a wrapped value stands for the turn nearest zero.
 _SIGNED = frozenset({"wheel_rate", "body_rate", "attitude_error", "rate_error", "control_torque", "wheel_torque"})
 
+#: More rows of one value than this share are a state of the craft, and no unfilled packets.
+_MOST_UNFILLED = 0.3
+
 #: Usual fill values; of 16 and 32 bits, of spreadsheets, and of NetCDF and CDF.
 _FILL_VALUES = frozenset(np.float32(v) for v in (
-    999, 9999, 99999, 999999, 9999.9, 99999.9, 32767, 32768, 65535, 2147483647, 2147483648, 4294967295, 1e20, 1e30, 1e31, 9.969209968386869e36,
+    999, 9999, 99999, 999999, 9999.9, 99999.9, 32767, 32768, 65535, 2147483647, 2147483648, 4294967295, 1e20, 1e30, 1e31, 9.969209968386869e36, 1e38, 3.4028234663852886e38,
 ))  # fmt: skip
 
 #: Doubts that a unit is not the one written.
@@ -248,12 +251,28 @@ def _within_limits(c: Channel, craft) -> tuple[Channel, list[Finding]]:
 
 
 def _without_fills(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
-    """A value that recurs bit for bit far outside the range of all others, which are alike before and after it.
+    """A value that recurs bit for bit far outside the range of all others, or where no motion leads.
 
     A step to another level, or motion, has values between, or does not come back."""
-    values = c.values
-    if c.kind.behaves == "cumulative" or len(values) < _FEWEST:
+    if len(c.values) < _FEWEST:
         return c, []
+    if c.kind.behaves == "cumulative":
+        fill = _beside_its_count(c.values)
+    else:
+        fill = _far_off(c, step)
+        if c.kind.stem in _MEASURED and not fill.all():
+            fill |= _unreachable(c, fill, step)
+    if not fill.any():
+        return c, []
+    said = ", ".join(f"{v:.6g}" for v in np.unique(c.values[fill])[:5])
+    return _marked(
+        c, fill, "fill", f"the value {said} {c.kind.unit} recurs far outside the range of all others; not used"
+    )
+
+
+def _far_off(c: Channel, step: float) -> np.ndarray:
+    """Samples of a value that recurs far outside the range of all others, which are alike before and after it."""
+    values = c.values
     fill = np.zeros(len(values), bool)
     for _ in range(3):  # more than one fill value may occur, the farthest first
         rest = values[~fill] if fill.any() else values
@@ -261,24 +280,21 @@ def _without_fills(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
         low, high = float(np.min(rest)), float(np.max(rest))
         far = high if high - centre > centre - low else low
         here = (values == far) & ~fill
-        if np.count_nonzero(here) < 2 or far == 0:
+        known = far != 0 and _is_known(c, far)
+        if np.count_nonzero(here) < (1 if known else 2) or far == 0:
             break
         others = values[~fill & ~here]
         if len(others) < _FEWEST:
             break
         spread = float(np.ptp(others)) + 10 * step
-        known = np.float32(abs(far)) in _FILL_VALUES
         if abs(far - centre) < (_FAR if not known else _NEAR) * max(spread, 1e-12 * abs(far)):
             break
         if not known and not _comes_back(values, here, fill, 0.2 * abs(far - centre)):
             break
+        if here.sum() == 1 and not (here[0] or here[-1]):
+            break  # a single sample within is a spike
         fill |= here
-    if not fill.any():
-        return c, []
-    said = ", ".join(f"{v:.6g}" for v in np.unique(values[fill]))
-    return _marked(
-        c, fill, "fill", f"the value {said} {c.kind.unit} recurs far outside the range of all others; not used"
-    )
+    return fill
 
 
 def _comes_back(values, here, fill, within: float) -> bool:
@@ -291,6 +307,51 @@ def _comes_back(values, here, fill, within: float) -> bool:
     if not inside.any():
         return False
     return bool((np.abs(values[sound[before[inside]]] - values[sound[after[inside]]]) < within).all())
+
+
+def _is_known(c: Channel, value: float) -> bool:
+    """Whether a value, in SI or as it was written, is one of the usual fill values or all nines."""
+    factor, shift = to_si(c.name, c.unit_given) if c.unit_given else (1.0, 0.0)
+    for written in (abs(value), abs((value - shift) / factor)):
+        digits = f"{written:.7g}".replace(".", "")
+        if np.float32(written) in _FILL_VALUES or (len(digits) >= 3 and set(digits) == {"9"}):
+            return True
+    return False
+
+
+def _unreachable(c: Channel, fill: np.ndarray, step: float) -> np.ndarray:
+    """Runs of one value that a wheel or an attitude cannot jump to: zeros within, and any value at the ends of the record.
+
+    At an end the jump must dwarf every other change."""
+    out = np.zeros(len(fill), bool)
+    at = np.flatnonzero(~fill)
+    v = c.values[at]
+    change = np.abs(np.diff(v))
+    if len(v) < _FEWEST or not change.any():
+        return out
+    floor = max(SPIKE_SIGMAS * sample_noise(c), 10 * step)
+    last = len(v) - 1
+    head, tail = int(np.argmax(v != v[0])), int(np.argmax(v[::-1] != v[last]))
+    fewest = 1 if c.kind.stem in ("wheel_rate", "quaternion") else 2
+    for run, place in ((slice(0, head), head - 1), (slice(last + 1 - tail, last + 1), last - tail)):
+        largest = max(float(np.max(np.delete(change, place), initial=0)), floor)
+        if fewest <= run.stop - run.start <= last // 2 and change[place] > SPIKE_SIGMAS * largest:
+            out[at[run]] = True
+    if c.kind.stem == "wheel_rate":
+        for start, stop in zip(*(x.tolist() for x in _runs_of(v == 0)), strict=True):
+            if stop - start > 1 and 0 < start and stop <= last and min(abs(v[start - 1]), abs(v[stop])) > floor:
+                out[at[start:stop]] = abs(v[stop] - v[start - 1]) < AGREE * abs(v[start - 1])
+    return out
+
+
+def _beside_its_count(values: np.ndarray) -> np.ndarray:
+    """Runs of one value in a counter that goes on behind them where it was before."""
+    out = np.zeros(len(values), bool)
+    turn = np.flatnonzero(np.diff(values) != 0) + 1
+    for start, stop in pairwise(turn.tolist()):
+        before, here, after = values[start - 1], values[start], values[stop]
+        out[start:stop] = before <= after and not before <= here <= after
+    return out
 
 
 def _without_plateaus(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
@@ -376,6 +437,7 @@ def _without_stuck(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
         if not rest and (noisy or abrupt):
             (stuck if noisy or held else still)[start + 1 : stop + 1] = True
     c, found = _marked(c, stuck, "stuck", "samples repeat one value after others that change; not used")
+    still &= c.valid
     if still.any():
         detail = "samples repeat one value after motion: a stuck sensor, or rest? Used"
         found.append(Finding(c.name, "still", int(still.sum()), int(c.tai_ns[still][0]), detail))
@@ -527,35 +589,55 @@ def _repeats_by_chance(values: np.ndarray, step: float) -> float:
 
 
 def _without_unfilled(channels: dict[str, Channel]) -> tuple[dict[str, Channel], list[Finding]]:
-    """Rows in which every measured channel reads exactly zero, between rows in which they do not: packets that were not filled."""
+    """Rows in which every measured channel, or every one of a family, reads the same value, most often zero, between rows in which
+    they do not: packets that were not filled."""
     channels, findings = dict(channels), []
-    for names in _frames(channels, _MEASURED):
-        zero = np.ones(len(channels[names[0]].values), bool)
-        for n in names:
-            zero &= channels[n].values == 0
-        if not zero.any() or zero.all():
-            continue
-        # at rest all read zero too; but then nothing jumps to zero and back
-        jumps = np.zeros(len(zero), bool)
-        for n in names:
-            v = channels[n].values
-            far = np.abs(np.diff(v)) > max(
-                SPIKE_SIGMAS * sample_noise(channels[n]), 0.1 * float(np.median(np.abs(v[~zero])))
+    for frame in _frames(channels, _MEASURED):
+        families: dict[str, list[str]] = {}
+        for n in frame:
+            families.setdefault(channels[n].kind.stem, []).append(n)
+        for names in (frame, *(those for those in families.values() if 2 < len(those) < len(frame))):
+            unfilled = _unfilled([channels[n] for n in names])
+            if not unfilled.any():
+                continue
+            for n in names:
+                channels[n] = replace(channels[n], valid=channels[n].valid & ~unfilled)
+            first = int(channels[names[0]].tai_ns[unfilled][0])
+            value = channels[names[0]].values[unfilled][0]
+            said = "zero" if value == 0 else f"{value:.6g}"
+            what = (
+                f"all {len(names)} measured channels"
+                if names is frame
+                else f"all channels {channels[names[0]].kind.stem}"
             )
-            jumps |= np.concatenate(([False], far)) | np.concatenate((far, [False]))
-        unfilled = np.zeros(len(zero), bool)
-        starts, stops = _runs_of(zero)
-        for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
-            ends = [i for i in (start, stop - 1) if 0 < i < len(zero) - 1 or stop - start == 1]
-            unfilled[start:stop] = bool(ends) and all(jumps[i] for i in ends)
-        if not unfilled.any():
-            continue
-        for n in names:
-            channels[n] = replace(channels[n], valid=channels[n].valid & ~unfilled)
-        first = int(channels[names[0]].tai_ns[unfilled][0])
-        detail = f"rows in which all {len(names)} measured channels are zero: unfilled packets; not used"
-        findings.append(Finding("", "fill", int(unfilled.sum()), first, detail))
+            detail = f"rows in which {what} are {said}: unfilled packets; not used"
+            findings += [
+                Finding(n, "fill", int(unfilled.sum()), first, detail)
+                for n in ([""] if names is frame and value == 0 else names)
+            ]
     return channels, findings
+
+
+def _unfilled(parts: list[Channel]) -> np.ndarray:
+    """Samples at which channels of one frame hold one and the same value, to which and from which one of them jumps."""
+    valid = np.all([c.valid for c in parts], axis=0)
+    same = valid & np.all([c.values == parts[0].values for c in parts], axis=0)
+    nothing = np.zeros(len(same), bool)
+    if not same.any() or np.mean(same) > _MOST_UNFILLED:
+        return nothing
+    # at rest all read zero too; but then nothing jumps to zero and back
+    jumps = nothing.copy()
+    for c in parts:
+        change = np.abs(np.diff(c.values))
+        least = 0.1 * float(np.median(np.abs(c.values[valid & ~same] - c.values[same][0])))
+        far = change > max(SPIKE_SIGMAS * sample_noise(c), least, 10 * quantisation_step(c.values[~same]))
+        jumps |= np.concatenate(([False], far)) | np.concatenate((far, [False]))
+    unfilled = nothing
+    starts, stops = _runs_of(same)
+    for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
+        ends = [i for i in (start, stop - 1) if 0 < i < len(same) - 1 or stop - start == 1]
+        unfilled[start:stop] = bool(ends) and all(jumps[i] for i in ends)
+    return unfilled
 
 
 def _of_one_sign(channels: dict[str, Channel]) -> tuple[dict[str, Channel], list[Finding]]:

@@ -6,6 +6,7 @@ comes from its heading (``load``) or from a channel dictionary (``dictionary``).
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ import numpy as np
 from ..kit.errors import BadInput, some_of
 from ..kit.timeline import NS, posix_to_tai_ns
 from .channels import split_header
-from .times import NotATime, Scale, dated_ns, exact_ns
+from .times import NotATime, Scale, dated_ns, exact_ns, is_stamp
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -42,6 +43,11 @@ class Table:
     def line(self, row: int) -> int | None:
         return int(self.lines[row]) if len(self.lines) else None
 
+    def begins_dated(self, column: int) -> bool:
+        """Whether the first cell of a column is a date."""
+        cells = self.columns[column]
+        return (isinstance(cells, np.ndarray) and cells.dtype.kind == "M") or (len(cells) > 0 and is_stamp(cells[0]))
+
     def take(self, rows, columns, headings=None) -> Table:
         """Some rows of some columns, under other headings where given."""
         cut = tuple(
@@ -57,6 +63,13 @@ class Table:
     def whole(self) -> Table:
         """The table with every column."""
         return self
+
+
+#: What programs write where there is no value, in small letters.
+NO_VALUE = frozenset((
+    "nan", "-nan", "+nan", "na", "n/a", "n.a.", "#n/a", "#na", "<na>", "null", "none", "nil", "nat", "-", "--", "---", "#div/0!", "#num!",
+    "#value!", "#null!", "#ref!", "#name?", "1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind",
+))  # fmt: skip
 
 
 # ---- cells ------------------------------------------------------------------------------------
@@ -80,7 +93,7 @@ def numbers_of(table: Table, column: int, channel: str) -> tuple[np.ndarray, np.
         rows, texts = _sampled(cells)
         values = np.array([_number(c) for c in texts], float)
         nan = np.isnan(values)
-        bad = next((i for i in np.flatnonzero(nan).tolist() if texts[i].strip().lower() != "nan"), None)
+        bad = next((i for i in np.flatnonzero(nan).tolist() if texts[i].strip().lower() not in NO_VALUE), None)
         if bad is not None:
             raise BadInput(
                 f"{_shown(texts[bad])} is not a number",
@@ -102,12 +115,18 @@ def numbers_of(table: Table, column: int, channel: str) -> tuple[np.ndarray, np.
 
 def _number(cell: str) -> float:
     """A cell as a number; NaN for one that is none.  Python also reads 1_000 and digits of other scripts: telemetry is not written so."""
+    if not cell.isascii():
+        cell = cell.replace("\N{MINUS SIGN}", "-").strip()  # also without a hard blank
     if not cell.isascii() or "_" in cell:
         return np.nan
     try:
         return float(cell)
     except ValueError:
-        return np.nan
+        return float(cell.upper().replace("D", "E")) if _FORTRAN.fullmatch(cell) else np.nan
+
+
+#: Double precision as Fortran writes it.
+_FORTRAN = re.compile(r"\s{0,99}[+-]?\d{0,40}\.?\d{1,40}[dD][+-]?\d{1,3}\s{0,99}", re.ASCII)
 
 
 def _sampled(cells: Any) -> tuple[np.ndarray, Sequence[str]]:

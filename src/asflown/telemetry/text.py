@@ -25,7 +25,7 @@ from ..kit.quantities import is_unit
 from ..kit.timeline import posix_to_tai_ns
 from .channels import split_header
 from .tables import Table, check_headings, checked, quiet_database, quoted_pattern, typed
-from .times import DECIMALS, UNITS_NS, NotATime, exact_ns
+from .times import DECIMALS, UNITS_NS, NotATime, exact_ns, is_stamp
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 _EPOCH_COMMENT = re.compile(r"#\s{0,9}epoch\s{0,9}[:=](.{0,200})", re.IGNORECASE)
 _DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
+_BLANKS = {" ": "blanks"}
 #: Lines looked at to tell how the table is written, and the most bytes they may take.
 _HEAD_LINES, _HEAD_BYTES = 200, 1 << 20
 #: Text beyond this is not read cell by cell in Python. [bytes]
@@ -60,6 +61,7 @@ class Form:
     first_line: int  # of the first row, counted from 1
     epoch: str | None
     notes: tuple[str, ...] = ()
+    first: tuple[str, ...] = ()  # cells of the first row
 
 
 def read_text(path: Path) -> TextFile:
@@ -123,14 +125,23 @@ def _decoded(data: bytes) -> str:
         raise BadInput("the file is empty", remedy="Give a table with a header line and at least one row.")
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         encoding = "utf-16"  # as spreadsheets write "Unicode text"
+    elif wide := [name for name, k in (("utf-16-le", 1), ("utf-16-be", 0)) if len(data) > 64 and not any(data[k:64:2])]:
+        encoding = wide[0]  # without its mark
     else:
         encoding = "utf-8-sig"
         if b"\0" in data:
             raise _not_text("the file contains zero bytes (NUL)")
     try:
-        return data.decode(encoding).replace("\r\n", "\n").replace("\r", "\n")
+        text = data.decode(encoding)
     except UnicodeDecodeError as why:
-        raise _not_text(why) from None
+        if encoding != "utf-8-sig" or set(data) & _NOT_WRITTEN:
+            raise _not_text(why) from None
+        text = data.decode("cp1252", "replace")  # as spreadsheets write "CSV": its signs for degrees and micro
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+#: Bytes that stand in no text of one byte a character.
+_NOT_WRITTEN = set(range(9)) | set(range(14, 26)) | {27, 127}
 
 
 def _head(path: Path) -> list[str]:
@@ -191,7 +202,11 @@ def form_of_rows(
         width = len(cells[0][1])  # of two lines, the second is the one cut short
     at = _first_row(cells, width)
     top, units = _header(cells[:at], width, comment)
-    notes = [] if delimiter == "," else [f"cells are separated by {_DELIMITERS.get(delimiter, repr(delimiter))}"]
+    notes = (
+        []
+        if delimiter == ","
+        else [f"cells are separated by {(_DELIMITERS | _BLANKS).get(delimiter, repr(delimiter))}"]
+    )
     if above := [n for n, _ in cells[:at] if n < top[0]]:
         notes.append(f"{len(above)} lines above the header (line {top[0]}) were not read")
     headings = [h.strip() for h in top[1]]
@@ -205,14 +220,30 @@ def form_of_rows(
         notes.append("the decimal sign is a comma")
     check_headings(headings)
     first = cells[at][0] if at < len(cells) else cells[-1][0] + 1
-    return Form(delimiter, decimal, tuple(headings), width, first, epoch, tuple(notes))
+    return Form(delimiter, decimal, tuple(headings), width, first, epoch, tuple(notes), tuple(body[0]) if body else ())
 
 
 def _cells(line: str, delimiter: str) -> list[str]:
     try:
-        return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+        cells = next(
+            csv.reader([line.strip() if delimiter == " " else line], delimiter=delimiter, skipinitialspace=True)
+        )
     except (csv.Error, StopIteration):
         return line.split(delimiter)
+    if delimiter != " ":
+        return cells
+    joined: list[str] = []  # a unit in brackets belongs to the name before it, also where it holds blanks
+    for cell in cells:
+        if joined and (cell[:1] in ("[", "(") or _is_open(joined[-1])):
+            joined[-1] += f" {cell}"
+        else:
+            joined.append(cell)
+    return joined
+
+
+def _is_open(cell: str) -> bool:
+    """Whether a bracket is not closed yet."""
+    return cell.count("[") > cell.count("]") or cell.count("(") > cell.count(")")
 
 
 def _delimiter_of(lines: list[str]) -> str:
@@ -232,7 +263,9 @@ def _delimiter_of(lines: list[str]) -> str:
     if not lines:
         return ","
     best = max(_DELIMITERS, key=score)
-    return best if score(best)[2] else ","
+    if score(best)[2] > 1:
+        return best
+    return " " if score(" ")[1:] > (0.9, 1) else ","
 
 
 def _is_number(cell: str) -> bool:
@@ -279,6 +312,8 @@ def _without_spare(headings: list[str], body: list[list[str]], width: int, line:
     """Headings without the blank cell that a delimiter at the end of lines makes.  Raises BadInput where widths disagree."""
     while len(headings) > width and headings[-1] == "":
         headings = headings[:-1]
+    if body and len(headings) + 1 == width and all(not r[-1].strip() for r in body if len(r) == width):
+        return headings
     if body and len(headings) != width:
         decimal = " Is the decimal sign a comma? Write a point." if len(headings) < width else ""
         raise BadInput(
@@ -320,6 +355,10 @@ class TextFile:
     def epoch(self) -> str | None:
         return self.form.epoch
 
+    def begins_dated(self, column: int) -> bool:
+        """Whether the first cell of a column is a date."""
+        return column < len(self.form.first) and is_stamp(self.form.first[column])
+
     @property
     def notes(self) -> tuple[str, ...]:
         return self.form.notes
@@ -327,7 +366,7 @@ class TextFile:
     def parsed(self, time: Iterable[int], scale: Scale, numbers: Iterable[int], words: Iterable[int]) -> Table:
         """The table with the columns that are used, by DuckDB where it can tell them, else cell by cell."""
         time = tuple(time)
-        large = self.path.stat().st_size > SMALL
+        large = self.path.stat().st_size > SMALL and self.form.delimiter != " "
         fast = _by_duckdb(self, time[0], scale, tuple(numbers), tuple(words)) if large and len(time) == 1 else None
         return self.whole() if fast is None else fast
 
@@ -504,7 +543,8 @@ def _cell_by_cell(text: str, form: Form) -> Table:
 def _csv_rows(numbered: list[tuple[int, str]], delimiter: str) -> list[list[str]]:
     """Cells of lines given with their numbers in the file."""
     rows: list[list[str]] = []
-    reader = csv.reader((line for _, line in numbered), strict=True, skipinitialspace=True, delimiter=delimiter)
+    bare = (line.strip() if delimiter == " " else line for _, line in numbered)
+    reader = csv.reader(bare, strict=True, skipinitialspace=True, delimiter=delimiter)
     try:
         for row in reader:
             if reader.line_num != len(rows) + 1:

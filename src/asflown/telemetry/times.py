@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kit.errors import BadInput
+from ..kit.quantities import TIME_WORDS
 from ..kit.timeline import NS, et_to_tai_ns, gps_to_tai_ns, posix_to_tai_ns, utc_to_tai_ns
 
 if TYPE_CHECKING:
@@ -20,10 +21,9 @@ if TYPE_CHECKING:
 UNITS_NS = {"ns": 1, "us": 1_000, "ms": 1_000_000, "s": NS, "min": 60 * NS, "h": 3_600 * NS, "d": 86_400 * NS}
 #: Decimals that numbers of these units may have; beyond the nanosecond they say nothing.
 DECIMALS = {"ns": 0, "us": 3, "ms": 6, "s": 9, "min": 11, "h": 13, "d": 14}
-_SPELLED = {
-    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "millisecond": "ms", "milliseconds": "ms",
-    "µs": "us", "μs": "us", "usec": "us", "microsecond": "us", "microseconds": "us", "nanosecond": "ns", "nanoseconds": "ns",
-    "minute": "min", "minutes": "min", "hour": "h", "hours": "h", "hr": "h", "day": "d", "days": "d",
+#: Scales as people call them.
+_KINDS = {
+    "utc": "utc", "iso": "utc", "iso8601": "utc", "iso-8601": "utc", "gmt": "utc", "mjd": "mjd", "jd": "jd", "posix": "unix",
 }  # fmt: skip
 #: Days from the origin of the scale to 1970-01-01.
 _DAYS_TO_1970 = {"mjd": Decimal(40_587), "jd": Decimal("2440587.5")}
@@ -80,9 +80,9 @@ def scale_called(text: str) -> Scale | None:
     if not 1 <= len(words) <= 2:
         return None
     kind, unit = ("", words[0]) if len(words) == 1 else (words[0].lower(), words[1])
-    if len(words) == 1 and unit.lower() in ("utc", "mjd", "jd"):
-        return Scale(unit.lower(), "d")
-    unit = _SPELLED.get(unit.lower(), unit)
+    if _KINDS.get(words[0].lower()) in ("utc", "mjd", "jd") and words[1:] in ([], ["d"], ["days"]):
+        return Scale(_KINDS[words[0].lower()], "d")
+    kind, unit = _KINDS.get(kind, kind), TIME_WORDS.get(unit.lower(), unit)
     return Scale(kind, unit) if kind in ("", "gps", "et", "unix") and unit in UNITS_NS else None
 
 
@@ -143,6 +143,15 @@ def dated_ns(cells: Iterable, scale: Scale) -> np.ndarray:
         except (BadInput, ValueError) as why:
             raise NotATime(row, getattr(why, "what", "")) from None
     return np.array(ns, np.int64)
+
+
+def is_stamp(cell: object) -> bool:
+    """Whether a cell is a date with a time of day, or a date, and no number."""
+    try:
+        utc_to_tai_ns(str(cell))
+    except BadInput:
+        return False
+    return not str(cell).strip().isdigit()
 
 
 class NotATime(Exception):
