@@ -6,8 +6,10 @@ import typer
 
 from .job import Job
 from .options import CM, CRAFT, INERTIA, JSON, numbers_of
+from .verb import verb
 
 
+@verb
 def budget(
     context: typer.Context,
     scenario: str = typer.Argument(

@@ -8,11 +8,13 @@ import typer
 
 from .options import JSON, hashes
 from .output import plain, print_doubts, print_json, provenance, wrapped
+from .verb import verb, weighed
 
 app = typer.Typer(help=__doc__, rich_markup_mode=None)
 
 
 @app.command("list")
+@verb
 def list_(json: bool = JSON) -> None:
     """The built-in crafts."""
     from ..craft.load import built_in_crafts, load_craft
@@ -33,6 +35,7 @@ def list_(json: bool = JSON) -> None:
 
 
 @app.command()
+@verb
 def show(
     name: str = typer.Argument(help="A built-in craft or a TOML file."),
     at: str = typer.Option(None, "--at", help="The date, UTC (default: the latest known state)."),
@@ -44,9 +47,10 @@ def show(
 
     c = load_craft(name)
     now = c.at(utc_to_tai_ns(at) if at is not None else None)
+    doubts = weighed(now.doubts)
     if json:
         print_json(
-            _record(c, now, at)
+            _record(c, now, at, doubts)
             | {"command": "craft show", "provenance": provenance(hashes(name), {"craft": name, "at": at})}
         )
         return
@@ -72,7 +76,7 @@ def show(
         print(
             f"  mechanism {m.name}: {m.mass:g} kg at ({m.from_cm[0]:+.3f} {m.from_cm[1]:+.3f} {m.from_cm[2]:+.3f}) m from the centre of mass"
         )
-    print_doubts(now.doubts)
+    print_doubts(doubts)
 
 
 def _print_law(k) -> None:
@@ -106,6 +110,7 @@ def _by_timing(thrusters) -> dict[str, list[str]]:
 
 
 @app.command(short_help="Start a craft file of your own.")
+@verb
 def new(
     name: str = typer.Argument(help="The craft's name; its file is NAME.toml in the working folder."),
     wheels: int = typer.Option(None, "--wheels", help="How many wheels (default: 3 along x, y, z)."),
@@ -120,7 +125,6 @@ def new(
     """Write a commented template of a craft file, which passes craft check; fill in your own values."""
     from ..craft.load import load_craft
     from ..craft.template import craft_template, outline, outline_of
-    from ..kit.doubts import Doubts
     from ..kit.errors import BadInput
     from ..kit.files import write_text
     from ..kit.quantities import quantity
@@ -136,7 +140,7 @@ def new(
         raise BadInput("there is such a file already", file=place, remedy="Choose another name, or remove it first.")
     write_text(place, craft_template(name, what))
     try:
-        doubts = Doubts(load_craft(place).at(None).doubts)
+        doubts = weighed(load_craft(place).at(None).doubts)
     except BadInput:
         place.unlink()
         raise
@@ -150,6 +154,7 @@ def new(
 
 
 @app.command(short_help="Check a craft file.")
+@verb
 def check(file: str = typer.Argument(help="A craft TOML file."), json: bool = JSON) -> None:
     """Check a craft file: report its errors, else say verb by verb what it allows and what is missing."""
     from ..craft.abilities import abilities
@@ -157,9 +162,10 @@ def check(file: str = typer.Argument(help="A craft TOML file."), json: bool = JS
 
     c = load_craft(file)
     now, can = c.at(None), abilities(c)
+    doubts = weighed(now.doubts)
     if json:
         print_json(
-            _record(c, now, None)
+            _record(c, now, None, doubts)
             | {"verbs": [a._asdict() for a in can], "command": "craft check"}
             | {"provenance": provenance(hashes(file), {"craft": file})}
         )
@@ -168,7 +174,7 @@ def check(file: str = typer.Argument(help="A craft TOML file."), json: bool = JS
           f"mass properties: {len(c.mass_properties)})")  # fmt: skip
     for a in can:
         print(wrapped(f"  {a.verb:16s} {'yes' if a.can else 'no ':3s}  ", a.note).rstrip())
-    print_doubts(now.doubts)
+    print_doubts(doubts)
 
 
 def _of_filter(craft, what: str):
@@ -176,7 +182,7 @@ def _of_filter(craft, what: str):
     return getattr(craft.wheel_controller.rate_filter, what, None)
 
 
-def _record(c, now, at) -> dict:
+def _record(c, now, at, doubts) -> dict:
     from ..craft.model import tensor
 
     inertia = plain(now.inertia_kgm2)
@@ -200,5 +206,5 @@ def _record(c, now, at) -> dict:
         },
         "center_of_mass_m": c.center_of_mass,
         "center_of_mass_assumed_m": c.center_of_mass_assumed,
-        **now.doubts.record(),
+        **doubts.record(),
     }  # fmt: skip

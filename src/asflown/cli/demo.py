@@ -10,6 +10,7 @@ import typer
 from .job import Job
 from .options import JSON
 from .output import provenance, say, wrapped
+from .verb import Asked, verb
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from ..kit.table import Table
 
 
+@verb
 def demo(
     context: typer.Context,
     folder: Path = typer.Option(Path("demo-out"), "--out", help="Folder for flights and figures."),
@@ -108,9 +110,11 @@ def _cover(folder: Path, craft: Craft, step: Callable[[str], None]) -> tuple[Act
 
 
 def _save(figures: dict, folder: Path) -> None:
-    from ..plots.figure import save
+    from ..kit.files import check_output
+    from ..plots.figure import PICTURE, save
 
     for name, figure in figures.items():
+        check_output(folder / f"{name}.svg", PICTURE, force=Asked.force)
         save(figure, folder / f"{name}.svg")
 
 
@@ -118,6 +122,7 @@ def _mission(folder: Path, craft: Craft) -> dict:
     """Eleven years of a cover flown, analysed, kept and judged, as `simulate`, `trend add` and `report` do; beside the truth."""
     from ..campaigns.papers import SEED
     from ..report.page import write_report
+    from ..report.pictures import check_page
     from ..sim.mission import fly_mission
     from ..trends.board import healths_in
     from ..trends.entries import load_events
@@ -126,14 +131,15 @@ def _mission(folder: Path, craft: Craft) -> dict:
     from .trend.add import analysed
 
     say("a mission of 20 actuations: flying")
-    truth = fly_mission("cassini-mission", folder, seed=SEED)
+    page = folder / "report.html"
+    check_page(page, force=Asked.force)
+    truth = fly_mission("cassini-mission", folder, seed=SEED, force=Asked.force)
     store = folder / "trends.db"
     entries = analysed(load_events(folder / "events.toml"), craft)
     with TrendStore.open(store) as trends:
         trends.add(entries)
     say("judging and drawing")
     healths = healths_in(str(store), None, [])
-    page = folder / "report.html"
     write_report(healths, page, provenance({}, {"store": str(store)}, SEED))
     deploys = healths[0]
     wanted = {name.rpartition("_N")[0]: v for name, v in truth["law"]["change_percent"].items()}

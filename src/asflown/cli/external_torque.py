@@ -8,8 +8,10 @@ import typer
 
 from .job import Job
 from .options import AIR, CHANNELS, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP, air_of, names_of
+from .verb import verb
 
 
+@verb
 def external_torque(
     context: typer.Context,
     file: Path = typer.Argument(help="Telemetry: CSV (plain or gzip), Parquet, NetCDF or HDF5."),

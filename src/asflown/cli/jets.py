@@ -25,8 +25,10 @@ from .flyby_options import (
 )
 from .job import Job
 from .options import CHANNELS, CRAFT, EXCLUDE, INERTIA, JSON, PLOT_DIR, START, STOP
+from .verb import verb
 
 
+@verb
 def jets(
     context: typer.Context,
     file: Path = typer.Argument(help="Telemetry: CSV (plain or gzip), Parquet, NetCDF or HDF5."),

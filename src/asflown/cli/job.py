@@ -10,6 +10,7 @@ Options are read from the verb's own parameters by name (``craft``, ``inertia``,
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -20,6 +21,7 @@ import typer
 from .options import craft_from
 from .output import print_doubts, print_json, say
 from .project import Defaults
+from .verb import WRITTEN, Asked, weighed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -47,6 +49,9 @@ _NOT_OPTIONS = frozenset(
         "name",
         "channels",
         "exclude",
+        "strict",
+        "accept",
+        "force",
     }
 )
 
@@ -87,7 +92,7 @@ class Job:
         """What was asked, for the provenance."""
         from ..kit.plain import plain
 
-        return {n: plain(v) for n, v in self.given.items() if n not in _NOT_OPTIONS}
+        return {n: plain(v) for n, v in self.given.items() if n not in _NOT_OPTIONS} | Asked.options()
 
     # ---- what comes out ----
 
@@ -111,6 +116,7 @@ class Job:
         ``failed``: a check failed, which ends the program with exit code 3."""
         result = replace(
             result,
+            doubts=weighed(result.doubts),
             inputs=tuple(dict.fromkeys((*result.inputs, *inputs, *Defaults.used))),
             options=self.options | (options or {}),
         )
@@ -143,6 +149,7 @@ class Job:
         ``last``: prints what comes after the doubts."""
         from ..kit.result import provenance
 
+        doubts = weighed(doubts)
         told = provenance((*inputs, *Defaults.used), self.options | (options or {}), seed)
         self._tell(record | doubts.record(), told, doubts, text, last)
 
@@ -162,20 +169,33 @@ class Job:
             last()
 
     def _write(self, result: Estimate, figures) -> None:
+        """The files asked for: all of them, or none."""
         out, plot, plot_dir = (self.given.get(n) for n in ("out", "plot", "plot_dir"))
-        if out is not None:
-            result.save(out)
-            say(f"wrote {out}")
-        if plot is not None:
-            from ..plots import save_figure
+        if out is plot is plot_dir is None:
+            return
+        from ..kit.files import together
 
-            save_figure(result, plot)
-            say(f"wrote {plot}")
-        if plot_dir is not None and figures is not None:
-            from ..plots.figure import save_figures
+        wrote, read = [], [i.file for i in result.inputs]
+        with together():
+            if out is not None:
+                self.may_write(out, result.kind, read)
+                result.save(out)
+                wrote.append(out)
+            if plot is not None:
+                from ..plots import save_figure
 
-            for path in save_figures(figures(result), plot_dir):
-                say(f"wrote {path}")
+                self.may_write(plot, "picture", read)
+                save_figure(result, plot)
+                wrote.append(plot)
+            if plot_dir is not None and figures is not None:
+                from ..plots.figure import save_figures
+
+                drawn = figures(result)
+                for name in drawn:
+                    self.may_write(plot_dir / f"{name}.svg", "picture", read)
+                wrote += save_figures(drawn, plot_dir)
+        for path in wrote:
+            say(f"wrote {path}")
 
     def _keep(self, entries: Entry | list[Entry]) -> None:
         from ..trends.store import TrendStore
@@ -184,16 +204,32 @@ class Job:
             for kept in trends.add(entries):
                 say(f"kept as {kept.event}, revision {kept.revision}")
 
+    def may_write(self, place: Path, kind: str, read: Iterable[str | Path] = ()) -> None:
+        """Raise BadInput where this output would replace an input (``read``: further ones), or a file that is not ours of its kind."""
+        from ..kit.files import check_output
+
+        check_output(place, kind, inputs=[*self.inputs, *read], force=Asked.force)
+
+    @property
+    def inputs(self) -> list[str]:
+        """Files among what was given, other than those to be written, and the project file."""
+        given = [v for n, v in self.given.items() if n not in WRITTEN]
+        several = [p for v in given for p in (v if isinstance(v, (list, tuple)) else [v])]
+        return [str(p) for p in several if isinstance(p, (str, Path)) and os.path.isfile(p)] + [
+            i.file for i in Defaults.used
+        ]
+
     def _check_places(self) -> None:
         """Before the work: whether what it makes can be written."""
         out, plot, plot_dir, folder = (self.given.get(n) for n in ("out", "plot", "plot_dir", "folder"))
         if out is None and plot is None and plot_dir is None and folder is None:
             return
-        from ..kit.files import check_folder, check_place
+        from ..kit.files import check_folder
 
-        for place in (out, plot):
-            if place is not None:
-                check_place(place)
+        if out is not None:
+            self.may_write(out, "result")
+        if plot is not None:
+            self.may_write(plot, "picture")
         if plot is not None:
             from ..plots.figure import picture_kind
 

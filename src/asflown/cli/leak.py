@@ -8,8 +8,10 @@ import typer
 
 from .job import Job
 from .options import CHANNELS, CM, CRAFT, EXCLUDE, INERTIA, INERTIA_SIGMA, JSON, SPIN_SIGMA, START, STOP, UNLIKE
+from .verb import verb
 
 
+@verb
 def leak(
     context: typer.Context,
     file: Path = typer.Argument(help="Telemetry: CSV (plain or gzip), Parquet, NetCDF or HDF5."),

@@ -1,13 +1,15 @@
 """asflown: what a spacecraft really is in flight, from its own telemetry.
 
-Exit codes: 0 done, 2 bad input or usage, 3 done but a check failed (alarm, watch).
+Exit codes: 0 done, 2 bad input or usage, 3 done but a check failed (alarm, watch, --strict), 130 stopped by Ctrl-C.
 """
 
 from __future__ import annotations
 
+import errno
 import itertools
 import os
 import sys
+from contextlib import redirect_stdout, suppress
 
 import typer
 
@@ -31,6 +33,7 @@ from . import (
     tune,
     wheels,
 )
+from .output import Shown, say
 
 app = typer.Typer(help=__doc__, add_completion=False, rich_markup_mode=None)
 app.command("torque", short_help="Reconstruct the disturbance torque.")(torque.torque)
@@ -79,29 +82,57 @@ def _program(
 
 def main() -> None:
     """Run one verb; bad input and usage become one message on standard error and exit code 2."""
+    _open_streams()
+    with redirect_stdout(Shown(sys.stdout)):  # type: ignore[type-var]
+        code = _run()
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _run() -> object:
+    """The exit code of the verb that the command line names; what stands on standard output is out then."""
     from ..kit.errors import BadInput
 
     code: object
     try:
         code = app(standalone_mode=False, prog_name="asflown")
+        sys.stdout.flush()
     except BadInput as why:
         code = _complain(str(why), told=why.record())
-    except typer.Abort:
+    except (typer.Abort, KeyboardInterrupt):
         code = 130
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:  # whoever read it has enough
+        _silence_output()
         code = 0
     except MemoryError:
         code = _complain("there is not enough memory for this job\nTake a shorter window or a shorter flight.")
     except Exception as why:
-        if hasattr(why, "format_message"):  # usage error of the parser
+        if isinstance(why, OSError) and why.errno in (errno.ENOSPC, errno.EIO, errno.EBADF) and why.filename is None:
+            _silence_output()
+            code = _complain(f"standard output cannot be written ({why.strerror})\nMake room, or write elsewhere.")
+        elif hasattr(why, "format_message"):  # usage error of the parser
             code = _complain(f"{why.format_message()}\nSee `{_verb(why)} --help`.")
         elif os.environ.get("ASFLOWN_DEBUG"):
             raise
         else:
             code = _complain(f"{type(why).__name__}: {why}\nThis is a fault of asflown, not of your data. "
                              "Please report it; ASFLOWN_DEBUG=1 shows where it happened.", 1)  # fmt: skip
-    sys.exit(code if isinstance(code, int) else 0)
+    return code
+
+
+def _open_streams() -> None:
+    """Standard streams that were closed lead nowhere: else the next file opened would take their place."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # the lowest number that is free
+    sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115
+    sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115
+
+
+def _silence_output() -> None:
+    """What is still to be written on standard output is thrown away, so that the interpreter's end does not try again."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _verb(usage) -> str:
@@ -113,7 +144,7 @@ def _verb(usage) -> str:
 
 def _complain(text: str, code: int = 2, told: dict | None = None) -> int:
     """One message on standard error; with --json also one object on standard output, so that a program need not parse words."""
-    print(f"error: {text}"[:1490], file=sys.stderr)
+    say(f"error: {text}"[:1490])
     if "--json" in sys.argv[1:]:
         import json
 
@@ -121,7 +152,9 @@ def _complain(text: str, code: int = 2, told: dict | None = None) -> int:
         record = told or {"what": what, "remedy": remedy, "file": None, "channel": None, "time": None, "line": None}
         words = itertools.takewhile(str.isidentifier, (w.replace("-", "_") for w in sys.argv[1:3]))
         command = " ".join(w.replace("_", "-") for w in words)
-        sys.stdout.write(json.dumps({"command": command, "error": record, "exit_code": code}) + "\n")
+        with suppress(OSError):
+            sys.stdout.write(json.dumps({"command": command, "error": record, "exit_code": code}) + "\n")
+            sys.stdout.flush()
     return code
 
 

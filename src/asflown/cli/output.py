@@ -6,8 +6,11 @@ import json
 import shutil
 import sys
 import textwrap
+from contextlib import suppress
 
+from ..kit.escapes import encodable, visible
 from ..kit.plain import plain
+from .verb import Asked
 
 
 def print_json(record: dict) -> None:
@@ -21,12 +24,27 @@ def provenance(inputs: dict[str, str], options: dict, seed=None) -> dict:
     from ..kit.result import provenance as told
     from .project import Defaults
 
-    return told([*(Input(n, d) for n, d in inputs.items()), *Defaults.used], options, seed)
+    return told([*(Input(n, d) for n, d in inputs.items()), *Defaults.used], options | Asked.options(), seed)
 
 
 def say(text: str = "") -> None:
     """Progress and remarks: standard error, so that standard output stays clean."""
-    print(text, file=sys.stderr, flush=True)
+    with suppress(OSError):  # nobody can read it: the answer itself counts
+        print(encodable(visible(text), sys.stderr.encoding), file=sys.stderr, flush=True)
+
+
+class Shown:
+    """Standard output on which nothing from outside commands the terminal, and which its encoding cannot stop."""
+
+    def __init__(self, stream):
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        self._stream.write(encodable(visible(text), self._stream.encoding))
+        return len(text)
+
+    def __getattr__(self, name):
+        return getattr(self._stream, name)
 
 
 def progress():
@@ -40,6 +58,8 @@ def print_doubts(doubts) -> None:
 
     for d in Doubts(doubts).gravest_first:
         print(wrapped(f"  {doubt_mark(d):<6} ", str(d)))
+    for d in Asked.accepted:
+        print(wrapped("  ACCEPTED ", str(d)))
 
 
 def wrapped(head: str, text: str) -> str:

@@ -9,8 +9,10 @@ import typer
 from .job import Job
 from .options import CM, INERTIA, JSON
 from .output import progress
+from .verb import Asked, verb
 
 
+@verb
 def simulate(
     context: typer.Context,
     scenario: str = typer.Argument(
@@ -33,7 +35,7 @@ def simulate(
     from ..kit.config import changes_of
     from ..kit.errors import BadInput
     from ..kit.result import inputs_of
-    from ..sim.flight import fly, write_flight
+    from ..sim.flight import check_flight, fly, write_flight
     from ..sim.mission import is_mission
     from ..sim.scenario import load_scenario
 
@@ -47,8 +49,9 @@ def simulate(
         _simulate_mission(job, scenario, folder, seed, noise)
         return
     plan = load_scenario(scenario).changed(**changes)
+    check_flight(folder, force=Asked.force, inputs=job.inputs)
     flight = fly(plan, craft=job.craft_named(craft or plan.craft), seed=seed, noise=noise, progress=progress())
-    files = write_flight(flight, folder)
+    files = write_flight(flight, folder, force=Asked.force)
 
     def text() -> None:
         print(f"{flight.scenario.name}: {flight.ended} (seed {flight.seed}, noise {flight.scenario.noise})")
@@ -64,11 +67,12 @@ def simulate(
 def _simulate_mission(job: Job, name: str, folder: Path, seed: int | None, noise: str | None) -> None:
     from ..kit.doubts import Doubts, doubt_from
     from ..kit.result import inputs_of
-    from ..sim.mission import fly_mission, load_mission
+    from ..sim.mission import check_mission, fly_mission, load_mission
 
     mission, craft = load_mission(name), job.given["craft"]
     vehicle = job.craft_named(craft or mission.craft)
-    done = fly_mission(mission, folder, craft=vehicle, seed=seed, noise=noise, progress=progress())
+    check_mission(folder, mission, force=Asked.force, inputs=job.inputs)
+    done = fly_mission(mission, folder, craft=vehicle, seed=seed, noise=noise, progress=progress(), force=Asked.force)
     events, truth = folder / "events.toml", folder / "mission.json"
 
     def text() -> None:

@@ -21,8 +21,10 @@ from .options import (
     air_of,
     names_of,
 )  # fmt: skip
+from .verb import verb
 
 
+@verb
 def sources(
     context: typer.Context,
     file: Path = typer.Argument(help="Telemetry: CSV (plain or gzip), Parquet, NetCDF or HDF5."),

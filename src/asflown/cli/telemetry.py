@@ -9,11 +9,13 @@ import typer
 
 from .options import CHANNELS, CM, EXCLUDE, INERTIA, JSON, START, STOP, craft_from, hashes
 from .output import print_doubts, print_json, provenance
+from .verb import verb, weighed
 
 app = typer.Typer(help=__doc__, rich_markup_mode=None)
 
 
 @app.command(short_help="What a file holds, and what is wrong with it.")
+@verb
 def check(
     file: Path = typer.Argument(help="CSV (plain or gzip), Parquet, NetCDF or HDF5."),
     channels: Path = CHANNELS,
@@ -39,8 +41,8 @@ def check(
 
     ship = craft_from(craft, inertia, cm) if craft else None
     t = load_telemetry(file, channels=channels, exclude=exclude, craft=ship).between(start, stop)
-    look = needs_a_look(t)
-    t = replace(t, doubts=t.doubts + sky_doubts(t, ship))
+    look = needs_a_look(replace(t, doubts=weighed(t.doubts)))
+    t = replace(t, doubts=weighed(t.doubts + sky_doubts(t, ship)))
     lines = summaries(t)
     if json:
         options = {"channels": channels, "exclude": exclude, "craft": craft, "inertia": inertia, "cm": cm, "start": start,
@@ -56,6 +58,7 @@ def check(
 
 
 @app.command()
+@verb
 def names(json: bool = JSON) -> None:
     """The channel names asflown knows, with their units."""
     from ..kit.doubts import Doubts

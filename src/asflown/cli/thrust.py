@@ -22,8 +22,10 @@ from .options import (
     STOP,
     UNLIKE,
 )
+from .verb import verb
 
 
+@verb
 def thrust(
     context: typer.Context,
     files: list[Path] = typer.Argument(

@@ -11,11 +11,13 @@ import typer
 from .job import Job
 from .options import AIR, CHANNELS, CM, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP, air_of, names_of
 from .output import say
+from .verb import verb
 
 if TYPE_CHECKING:
     from ..estimate.torque import TorqueResult
 
 
+@verb
 def torque(
     context: typer.Context,
     file: Path = typer.Argument(help="Telemetry: CSV (plain or gzip), Parquet, NetCDF or HDF5."),

@@ -6,8 +6,10 @@ import typer
 
 from .job import Job
 from .options import CM, CRAFT, INERTIA, JSON, numbers_of
+from .verb import verb
 
 
+@verb
 def tune(
     context: typer.Context,
     spans: str = typer.Option(None, "--spans", help='Shares of the record to try, as in "0.04,0.08,0.12".'),

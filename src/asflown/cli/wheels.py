@@ -10,6 +10,7 @@ import typer
 from .job import Job
 from .options import CHANNELS, CRAFT, EXCLUDE, JSON, KEEP_AS, KEEP_IN, START, STOP
 from .output import progress, say
+from .verb import verb
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from ..trends.entry import Entry
 
 
+@verb
 def wheels(
     context: typer.Context,
     files: list[Path] = typer.Argument(

@@ -1,4 +1,4 @@
-"""The only use of numba: kernels are compiled where it is installed and run as plain Python where it is not.
+"""The only use of numba (with its cache, ``kernel_cache``): kernels are compiled where it is installed and run as plain Python where it is not.
 
 Kernels that call each other stand in one module: numba's cache does not notice a callee that changed
 in another file.
@@ -30,12 +30,12 @@ class _Kernel:
     def compiled(self):
         """Compiled, as are from then on all kernels of its module: numba knows those it calls by their names there."""
         try:
-            from numba import njit
+            from .kernel_cache import compiled
         except ImportError:
             return self.function
         of_module = self.function.__globals__
         for name, kernel in list(of_module.items()):
             if isinstance(kernel, _Kernel):
                 own = kernel.function.__globals__ is of_module
-                of_module[name] = njit(cache=True)(kernel.function) if own else kernel.compiled
+                of_module[name] = compiled(kernel.function) if own else kernel.compiled
         return of_module[self.function.__name__]

@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, ParamSpec, TypeVar
 
 from .doubts import Doubts
 from .errors import BadInput
-from .files import sha256_of, write_text, write_whole
+from .escapes import on_one_line
+from .files import mark, sha256_of, write_text, write_whole
 from .plain import plain
 
 if TYPE_CHECKING:
@@ -108,6 +109,11 @@ class Estimate:
     # ---- derived ----
 
     @property
+    def kind(self) -> str:
+        """What a saved result calls itself, so that another kind of file is not replaced by it."""
+        return f"result {type(self).__name__}"
+
+    @property
     def provenance(self) -> dict:
         return provenance(self.inputs, self.options, self.seed)
 
@@ -174,7 +180,7 @@ class Estimate:
         Raises BadInput for another suffix, for a file that cannot be written, and for a table of a result without a series."""
         kind = Path(path).suffix.lower()
         if kind == ".json":
-            whole = self.record() | {"provenance": self.provenance}
+            whole = {"file": mark(self.kind)} | self.record() | {"provenance": self.provenance}
             write_text(path, json.dumps(plain(whole), allow_nan=False, indent=1) + "\n")
         elif kind in (".csv", ".parquet"):
             if self.series() is None:
@@ -210,17 +216,23 @@ class Estimate:
         """Comment lines, a heading with units, and rows; blank where unknown.  No partial file remains."""
         series = self._needed_series()
         columns = _flat(series)
-        lines = [
-            f"# epoch: {self.epoch}",
-            f"# {type(self).__name__}; craft {self.craft}; {self.method}, {self.variant}",
-        ]
-        lines += [f"# DOUBT ({d.severity.label}) {d}" for d in self.doubts]
-        lines += [f"# input {i.file} sha256 {i.sha256}" for i in self.inputs]
-        lines.append(f"# asflown {version('asflown')}, options {plain(self.options)}")
+        lines = self._remarks(f"{type(self).__name__}; craft {self.craft}; {self.method}, {self.variant}")
         lines.append(",".join(["time_s", *columns]))
         rows = zip(series.time_s, *columns.values(), strict=True)
         lines.extend(",".join("" if v != v else repr(float(v)) for v in row) for row in rows)
         write_text(path, "\n".join(lines) + "\n")
+
+    def _remarks(self, what: str) -> list[str]:
+        """Comment lines above a saved table: epoch, what it is, doubts, provenance."""
+        remarks = [
+            f"epoch: {self.epoch}",
+            what,
+            *(f"DOUBT ({d.severity.label}) {d}" for d in self.doubts),
+            *(f"input {i.file} sha256 {i.sha256}" for i in self.inputs),
+            f"asflown {version('asflown')}, options {plain(self.options)}",
+            mark(self.kind),
+        ]
+        return [f"# {on_one_line(r)}" for r in remarks]
 
     def _save_parquet(self, path) -> None:
         import duckdb
@@ -232,7 +244,11 @@ class Estimate:
             with duckdb.connect() as link:
                 link.register("frame", frame)
                 target = str(place).replace("'", "''")
-                link.execute(f"COPY frame TO '{target}' (FORMAT parquet, KV_METADATA {{asflown: '{kept}'}})")
+                told = f"{{asflown: '{kept}', file: '{mark(self.kind)}'}}"
+                try:
+                    link.execute(f"COPY frame TO '{target}' (FORMAT parquet, KV_METADATA {told})")
+                except duckdb.Error as why:
+                    raise OSError(str(why).splitlines()[0]) from None
 
         write_whole(path, write)
 

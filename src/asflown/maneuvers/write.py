@@ -8,13 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..kit.files import write_text
+from ..kit.files import mark, write_text
 from ..kit.timeline import utc_label
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from .table import Maneuvers
+
+
+#: What such a table calls itself (see ``kit.files.is_ours``).
+MANEUVERS = "maneuvers"
 
 
 def write_maneuvers(m: Maneuvers, path: str | Path) -> None:
@@ -53,6 +57,7 @@ def maneuver_text(m: Maneuvers) -> str:
     if any(m.ledger):
         columns["adjusted"] = ["; ".join(a.name for a in book) for book in m.ledger]
     text = io.StringIO()
+    text.write(f"# {mark(MANEUVERS)}\n")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
     writer.writerows(

@@ -30,11 +30,12 @@ _DRAWN = {
 def draw(result, ax=None):
     """Draw a result's main panel into ``ax``, or into new axes, and return them.  Raises TypeError for what has no picture."""
     module, function, _ = _of(result)
-    if ax is None:
-        from .figure import new_figure
+    from .figure import as_written, new_figure
 
-        ax = new_figure()[1][0]
-    return getattr(import_module(f".{module}", __name__), function)(result, ax)
+    ax = new_figure()[1][0] if ax is None else ax
+    drawn = getattr(import_module(f".{module}", __name__), function)(result, ax)
+    as_written(ax)
+    return drawn
 
 
 def save_figure(result, path: str | Path) -> None:

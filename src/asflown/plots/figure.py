@@ -10,7 +10,8 @@ import numpy as np
 
 from ..kit.doubts import doubt_mark
 from ..kit.errors import BadInput
-from ..kit.files import write_whole
+from ..kit.escapes import visible
+from ..kit.files import mark, write_whole
 
 if TYPE_CHECKING:
     from ..kit.doubts import Doubts
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 BLUE, ORANGE, GREEN, RED, PURPLE, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#777777"
 SKY = "#56B4E9"
 BY_AXIS = (BLUE, ORANGE, GREEN)
+#: What pictures call themselves (see ``kit.files.is_ours``).
+PICTURE = "picture"
 _ROOM = 4  # doubts beneath a figure
 
 
@@ -48,6 +51,27 @@ def write_doubts(figure, doubts: Doubts, *, columns: int = 125) -> None:
         figure.supxlabel("\n".join(lines), fontsize=6.5, color=RED, x=0.02, ha="left")
 
 
+def as_written(drawn) -> None:
+    """Show every text of a figure or of axes as it is: names from outside are no formulas, and hold no control characters.
+
+    Ticks keep the formulas of their own numbers."""
+    from matplotlib.axis import Axis
+    from matplotlib.text import Text
+    from matplotlib.ticker import FixedFormatter
+
+    numbers: set[int] = set()
+    for axis in drawn.findobj(Axis):
+        words = axis.get_major_formatter()
+        if isinstance(words, FixedFormatter):
+            words.seq = [visible(str(w)) for w in words.seq]
+        else:
+            numbers |= {id(t) for t in axis.findobj(Text) if t is not axis.label}
+    for text in drawn.findobj(Text):
+        if id(text) not in numbers:
+            text.set_parse_math(False)
+            text.set_text(visible(text.get_text()))
+
+
 def picture_kind(path: str | Path) -> str:
     """'svg', 'png' or 'pdf'.  Raises BadInput for any other suffix."""
     kind = Path(path).suffix.lower().removeprefix(".")
@@ -59,10 +83,15 @@ def picture_kind(path: str | Path) -> str:
 
 def save(figure, path: str | Path) -> None:
     """SVG, PNG or PDF by the suffix; text stays text in SVG, and equal input gives equal bytes."""
-    kind = picture_kind(path)
-    date_key = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}[kind]
+    kind, ours = picture_kind(path), mark(PICTURE)
+    told = {
+        "svg": {"Date": None, "Creator": ours},
+        "pdf": {"CreationDate": None, "Creator": ours},
+        "png": {"Software": ours},
+    }
+    as_written(figure)
     with _look("asflown"):
-        write_whole(path, lambda p: figure.savefig(p, format=kind, dpi=150, metadata=date_key))
+        write_whole(path, lambda p: figure.savefig(p, format=kind, dpi=150, metadata=told[kind]))
 
 
 def save_figures(figures: dict, folder: Path) -> list[Path]:
@@ -76,6 +105,7 @@ def save_figures(figures: dict, folder: Path) -> list[Path]:
 
 def save_svg(figure, stream, salt: str) -> None:
     """SVG into a text stream; ``salt`` makes its ids differ from other figures' in the same page."""
+    as_written(figure)
     with _look(salt):
         figure.savefig(stream, format="svg", metadata={"Date": None})
 

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
 from ..estimate.gates import FEWEST_BEFORE, gates_watch
-from ..kit.errors import BadInput
-from ..kit.files import check_place, write_text
 from ..kit.plain import plain
 from ..plots.gates import gates_figures
 from ..plots.gates_watch import watch_figures
-from .pictures import Picture, svg_of, template
+from .pictures import Picture, svg_of, template, write_page
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -32,14 +29,6 @@ _WORDS = {
 _PANELS = ("distribution", "degradation")
 
 
-def check_report(out: Path) -> None:
-    """Raise BadInput where the page or its JSON cannot be written."""
-    if out.suffix.lower() not in (".html", ".htm"):
-        raise BadInput("a report is an HTML page", file=out, remedy="Name it .html.")
-    check_place(out)
-    check_place(out.with_suffix(".json"))
-
-
 def write_gates_report(result: GatesResult, out: Path) -> Path:
     """Write the page of a judged fit to ``out`` and the same as JSON next to it; returns the path of the JSON.
 
@@ -57,11 +46,8 @@ def write_gates_report(result: GatesResult, out: Path) -> Path:
         told=str(result), watched=str(watched or ""), version=__version__,
         pictures=[Picture(*_WORDS[name], svg_of(figure, name, titles=name in _PANELS)) for name, figure in figures.items()],
     )  # fmt: skip
-    twin = out.with_suffix(".json")
     whole = record | {"verdict": verdict, "watch": None if watched is None else watched.record()}
-    write_text(out, page)
-    write_text(twin, json.dumps(plain(whole), allow_nan=False, indent=1) + "\n")
-    return twin
+    return write_page(out, page, whole)
 
 
 def _verdict(result: GatesResult, watched: GatesWatchResult | None) -> tuple[str, str]:

@@ -4,19 +4,16 @@ Reads a verdict, draws with plots, fills a template.  Pictures are SVG inside th
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..kit.doubts import Doubts
-from ..kit.files import write_text
-from ..kit.plain import plain
 from ..plots import trend as draw
 from ..trends.entries import BASES
 from ..trends.entry import MOVES
 from ..trends.record import health_record, sudden_words
-from .pictures import Picture, svg_of, template
+from .pictures import Picture, svg_of, template, write_page
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,7 +30,6 @@ def write_report(healths: list[Health], out: Path, provenance: dict) -> tuple[Pa
     ``healths``: a verdict for each kind, the one that decides first.  Raises BadInput where the places cannot be written."""
     from .. import __version__
 
-    twin = out.with_suffix(".json")
     record = {
         "command": "report", "verdict": healths[0].verdict, "reasons": list(healths[0].reasons),
         "kinds": [health_record(h) for h in healths],
@@ -43,9 +39,7 @@ def write_report(healths: list[Health], out: Path, provenance: dict) -> tuple[Pa
         healths=healths, main=healths[0], sections=[(h, _pictures(h)) for h in healths],
         provenance=provenance, version=__version__, moves=MOVES,
     )  # fmt: skip
-    write_text(out, page)
-    write_text(twin, json.dumps(plain(record), allow_nan=False, indent=1) + "\n")
-    return twin, record
+    return write_page(out, page, record), record
 
 
 def _pictures(h: Health) -> list[Picture]:

@@ -3,14 +3,42 @@
 from __future__ import annotations
 
 import io
+import json
 import re
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
+from ..kit.errors import BadInput
+from ..kit.escapes import visible
+from ..kit.files import check_output, mark, together, write_text
+from ..kit.plain import plain
 from ..plots.figure import BLUE, GREY, save_svg
 from ..plots.trend import GREYS
 
+if TYPE_CHECKING:
+    from pathlib import Path
+
+#: What a page and its JSON call themselves (see ``kit.files.is_ours``).
+REPORT = "report"
 #: Ink in which the pictures are drawn, to be replaced by the page's.
 _INK, _GRID = "#010203", "#e4e4e4"
+
+
+def check_page(out: Path, *, inputs=(), force: bool = False) -> None:
+    """Raise BadInput where the page or its JSON cannot be written, or would replace another's file."""
+    if out.suffix.lower() not in (".html", ".htm"):
+        raise BadInput("a report is an HTML page", file=out, remedy="Name it .html.")
+    for place in (out, out.with_suffix(".json")):
+        check_output(place, REPORT, inputs=inputs, force=force)
+
+
+def write_page(out: Path, page: str, record: dict) -> Path:
+    """The page and the same as JSON beside it, both or none; returns the path of the JSON."""
+    twin = out.with_suffix(".json")
+    with together():
+        write_text(out, page)
+        write_text(twin, json.dumps({"file": mark(REPORT)} | plain(record), allow_nan=False, indent=1) + "\n")
+    return twin
 
 
 @dataclass(frozen=True)
@@ -67,8 +95,10 @@ def template(name: str, **filters):
         loader=PackageLoader("asflown.report"),
         autoescape=True,
         undefined=StrictUndefined,
+        finalize=lambda value: visible(value) if type(value) is str else value,
         trim_blocks=True,
         lstrip_blocks=True,
     )
     environment.filters |= filters
+    environment.globals["mark"] = mark(REPORT)
     return environment.get_template(name)

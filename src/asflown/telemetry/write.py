@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import gzip
+import io
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,6 +38,35 @@ def write_table(telemetry: Telemetry, path: str | Path) -> None:
         Where the file cannot be written.
     """
     path = Path(path)
+    for source in telemetry.inputs:
+        if path.exists() and os.path.exists(source.file) and os.path.samefile(path, source.file):
+            raise BadInput("the table would replace the file it was read from", file=path, remedy="Name another file.")
+    columns, epoch = _cells(telemetry), _epoch_text(telemetry)
+    states = [f"{n} [{c.kind.unit}]" for n, c in telemetry.channels.items() if c.kind.behaves == "state"]
+    words = {*telemetry.time_labels, *states}
+
+    def write(place: Path) -> None:
+        if path.suffix == ".parquet":
+            _write_parquet(columns, words, epoch, place)
+        else:
+            data = _csv_text(columns, epoch).encode()
+            # no date inside: same bytes each time
+            place.write_bytes(gzip.compress(data, 6, mtime=0) if path.suffix == ".gz" else data)
+
+    if not path.parent.is_dir():
+        raise BadInput(
+            "the table cannot be written (the folder does not exist)", file=path, remedy="Choose another folder."
+        )
+    write_whole(path, write)
+
+
+def table_text(telemetry: Telemetry) -> str:
+    """The CSV that ``write_table`` writes."""
+    return _csv_text(_cells(telemetry), _epoch_text(telemetry))
+
+
+def _cells(telemetry: Telemetry) -> dict[str, list]:
+    """Columns of text by heading, a row per instant."""
     rows_ns = [c.tai_ns for c in telemetry.channels.values()]
     if telemetry.time_labels:
         rows_ns.append(telemetry.label_tai_ns)
@@ -47,21 +78,7 @@ def write_table(telemetry: Telemetry, path: str | Path) -> None:
         state = c.kind.behaves == "state"
         cells = [str(v) for v in c.values.tolist()] if state else [repr(float(v)) for v in c.values.tolist()]
         columns[f"{name} [{c.kind.unit}]"] = _spread(instants, c.tai_ns, cells)
-    epoch = _epoch_text(telemetry)
-    states = [f"{n} [{c.kind.unit}]" for n, c in telemetry.channels.items() if c.kind.behaves == "state"]
-    words = {*telemetry.time_labels, *states}
-
-    def write(place: Path) -> None:
-        if path.suffix == ".parquet":
-            _write_parquet(columns, words, epoch, place)
-        else:
-            _write_csv(columns, epoch, place, packed=path.suffix == ".gz")
-
-    if not path.parent.is_dir():
-        raise BadInput(
-            "the table cannot be written (the folder does not exist)", file=path, remedy="Choose another folder."
-        )
-    write_whole(path, write)
+    return columns
 
 
 def _epoch_text(telemetry: Telemetry) -> str | None:
@@ -84,17 +101,14 @@ def _spread(instants: np.ndarray, at_ns: np.ndarray, cells: list[str]) -> list[s
     return column
 
 
-def _write_csv(columns: dict[str, list], epoch: str | None, path: Path, *, packed: bool) -> None:
-    import io
-
+def _csv_text(columns: dict[str, list], epoch: str | None) -> str:
     text = io.StringIO()
     if epoch:
         text.write(f"# epoch: {epoch}\n")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
     writer.writerows(zip(*columns.values(), strict=True))
-    data = text.getvalue().encode()
-    path.write_bytes(gzip.compress(data, 6, mtime=0) if packed else data)  # no date inside: same bytes each time
+    return text.getvalue()
 
 
 def _write_parquet(columns: dict[str, list], words: set[str], epoch: str | None, path: Path) -> None:

@@ -11,6 +11,7 @@ import typer
 from ..job import Job
 from ..options import CRAFT, JSON, KEEP_AS, KEEP_IN, PLOT_DIR
 from ..output import say
+from ..verb import Asked, verb
 from .options import AGAINST, ENGINE, FILE, WITHOUT, held, maneuvers_from, past_named, removed_bias
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ REPORT = typer.Option(
 )  # fmt: skip
 
 
+@verb
 def fit(
     context: typer.Context,
     file: Path = FILE,
@@ -70,7 +72,7 @@ def fit(
         return gates_entry(result, job.craft, name)
 
     job = Job(context)
-    _check(patch, removed, report)
+    _check(job, patch, removed, report)
     if store is not None:
         job.craft_named(craft)  # whose entry it will be: before the work
     compared = None
@@ -91,7 +93,7 @@ def fit(
     job.finish(result, inputs=inputs, entry=entry, figures=gates_figures)
 
 
-def _check(patch: str | None, removed: str | None, report: Path | None) -> None:
+def _check(job: Job, patch: str | None, removed: str | None, report: Path | None) -> None:
     """Before the work: options that need each other, and whether the page can be written."""
     from ...kit.errors import BadInput
 
@@ -100,9 +102,9 @@ def _check(patch: str | None, removed: str | None, report: Path | None) -> None:
             "--removed without --patch", remedy="Name the first burn after the patch, as in --patch OTM-330."
         )
     if report is not None:
-        from ...report.gates_page import check_report
+        from ...report.pictures import check_page
 
-        check_report(report)
+        check_page(report, inputs=job.inputs, force=Asked.force)
 
 
 def _patched(burns: Maneuvers, patch: str, removed: str | None) -> GatesPatch:

@@ -6,8 +6,10 @@ import typer
 
 from ..job import Job
 from ..options import JSON
+from ..verb import verb
 
 
+@verb
 def history(
     context: typer.Context,
     engine: str = typer.Option(None, "--engine", help="main-engine or rcs; both unless given."),

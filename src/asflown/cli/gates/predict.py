@@ -11,12 +11,17 @@ import typer
 from ..job import Job
 from ..options import JSON
 from ..output import say
+from ..verb import verb
 from .options import ENGINE, maneuvers_from, past_named
 
 if TYPE_CHECKING:
     from ...estimate.gates import GatesPredictionResult
 
+#: What the table of samples calls itself (see ``kit.files.is_ours``).
+SAMPLES = "samples"
 
+
+@verb
 def predict(
     context: typer.Context,
     plan: Path = typer.Argument(help="Burns to come: a table with id and dv, or expected_dv and craft_x."),
@@ -34,7 +39,6 @@ def predict(
     """Execution errors to be expected of burns yet to be flown: means, covariances, the 95 % ellipsoid, samples."""
     from ...estimate.gates import gates, gates_prediction
     from ...kit.errors import BadInput
-    from ...kit.files import check_place
     from ...kit.result import inputs_of
     from ...maneuvers.plan import load_plan
 
@@ -45,9 +49,9 @@ def predict(
         )
     if (samples > 0) != (table is not None):
         raise BadInput("--samples and --out go together", remedy="Give --samples N --out FILE.csv.")
-    if table is not None:
-        check_place(table)
     job = Job(context)
+    if table is not None:
+        job.may_write(table, SAMPLES)
     burns = load_plan(plan)
     source = past_named(by, engine) if past is None else gates(maneuvers_from(past, engine), model=model)
     result = replace(gates_prediction(burns, source), seed=seed if samples else None)
@@ -63,10 +67,11 @@ def _write_samples(result: GatesPredictionResult, count: int, seed: int, table: 
 
     import numpy as np
 
-    from ...kit.files import write_text
+    from ...kit.files import mark, write_text
 
     rng = np.random.default_rng(seed)
     text = io.StringIO()
+    text.write(f"# {mark(SAMPLES)}\n")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["id", "sample", "error_x [m/s]", "error_y [m/s]", "error_z [m/s]"])
     for b in result.burns:

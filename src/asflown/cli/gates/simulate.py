@@ -10,6 +10,7 @@ from ...kit.doubts import Doubts, Kind, Severity
 from ..job import Job
 from ..options import JSON
 from ..output import say
+from ..verb import verb
 
 #: From burn to burn, where a start is given.
 _TEN_DAYS_NS = 864_000_000_000_000
@@ -20,6 +21,7 @@ ASSUMED = Kind(
 )  # fmt: skip
 
 
+@verb
 def simulate(
     context: typer.Context,
     by: str = typer.Option("rcs/2012-1", "--by", help="A model of the history, biases as found."),
@@ -41,15 +43,14 @@ def simulate(
     import numpy as np
 
     from ...kit.errors import BadInput
-    from ...kit.files import check_place
     from ...kit.quantities import quantity
     from ...kit.timeline import utc_to_tai_ns
     from ...maneuvers.history import RCS, past_model
-    from ...maneuvers.write import write_maneuvers
+    from ...maneuvers.write import MANEUVERS, write_maneuvers
     from ...sim.maneuver_sets import MAIN_ENGINE_SET, RCS_SET, execute
 
     job = Job(context)
-    check_place(table)
+    job.may_write(table, MANEUVERS)
     past = past_model(by)
     burns = RCS_SET if past.engine == RCS else MAIN_ENGINE_SET
     burns = replace(burns, count=count or burns.count)

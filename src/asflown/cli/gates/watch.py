@@ -8,9 +8,11 @@ import typer
 
 from ..job import Job
 from ..options import JSON, PLOT_DIR
+from ..verb import verb
 from .options import AGAINST, ENGINE, FILE, WITHOUT, maneuvers_from, past_named
 
 
+@verb
 def watch(
     context: typer.Context,
     file: Path = FILE,

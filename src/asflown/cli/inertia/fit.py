@@ -9,8 +9,10 @@ import typer
 from ..job import Job
 from ..options import CHANNELS, CRAFT, EXCLUDE, INERTIA, JSON, KEEP_AS, KEEP_IN, START, STOP
 from ..output import progress
+from ..verb import verb
 
 
+@verb
 def fit(
     context: typer.Context,
     file: Path = typer.Argument(help="Telemetry: CSV (plain or gzip), Parquet, NetCDF or HDF5."),

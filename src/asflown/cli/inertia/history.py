@@ -7,8 +7,10 @@ import typer
 from ..job import Job
 from ..options import CRAFT, JSON
 from ..output import say
+from ..verb import verb
 
 
+@verb
 def history(
     context: typer.Context,
     craft: str = CRAFT,

@@ -8,8 +8,10 @@ import typer
 
 from ..job import Job
 from ..options import CHANNELS, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP
+from ..verb import verb
 
 
+@verb
 def plan(
     context: typer.Context,
     file: Path = typer.Argument(None, help="What has been flown; left out: nothing."),

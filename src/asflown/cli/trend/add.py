@@ -8,10 +8,12 @@ import typer
 
 from ..options import CHANNELS, CM, CRAFT, INERTIA, JSON, craft_from, hashes
 from ..output import print_json, provenance, wrapped
+from ..verb import verb, weighed
 from .store_options import FIGURES, STORE, without_password
 from .tables import doubts_by_event
 
 
+@verb
 def add(
     events: Path = typer.Argument(help="Event list (TOML or CSV), or telemetry with the motor's current."),
     store: str = STORE,
@@ -41,7 +43,7 @@ def add(
         "options": {k: None if v is None else str(v) for k, v in options.items()},
     }
     kept_with["list"] = origin["inputs"]
-    entries = [replace(e, provenance=kept_with | e.provenance) for e in entries]
+    entries = [replace(e, provenance=kept_with | e.provenance, doubts=weighed(e.doubts)) for e in entries]
     with TrendStore.open(store) as trends:
         added = trends.add(entries)
     if json:

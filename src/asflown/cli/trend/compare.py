@@ -6,10 +6,12 @@ import typer
 
 from ..options import JSON
 from ..output import print_doubts, print_json, provenance
-from .store_options import FIGURE, KIND, STORE, WHOSE, without_password
+from ..verb import verb
+from .store_options import FIGURE, KIND, STORE, WHOSE, weighed_all, without_password
 from .tables import print_cold_warm, print_two
 
 
+@verb
 def compare(
     first: str = typer.Argument(None, help="An event to compare with a second one; cold and warm pairs unless given."),
     second: str = typer.Argument(None),
@@ -31,7 +33,7 @@ def compare(
         raise BadInput(
             "a comparison needs two events", remedy="Name two events, or none to compare cold and warm ones."
         )
-    health = health_in(store, craft, kind, [], margin=margin / 100)
+    (health,) = weighed_all([health_in(store, craft, kind, [], margin=margin / 100)])
     record = cold_warm_record(health) if first is None else two_record(health, first, second)
     if figure is not None:
         health.figure(figure)

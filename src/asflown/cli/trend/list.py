@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from ..options import JSON
 from ..output import print_json, provenance
+from ..verb import verb, weighed
 from .store_options import BASIS, FIGURE, STORE, WHOSE, without_password
 from .tables import value_of
 
 
+@verb
 def list_(store: str = STORE, figure: str = FIGURE, basis: str = BASIS, craft: str = WHOSE, json: bool = JSON) -> None:
     """Events in the store by date, with days since the last actuation and cycles used, both computed from the dates."""
     from ...kit.doubts import Doubts
@@ -25,7 +27,7 @@ def list_(store: str = STORE, figure: str = FIGURE, basis: str = BASIS, craft: s
     rows: list[dict] = [
         {"event": e.event, "kind": e.kind, "date": e.date, "revision": e.revision, "motor": e.motor,
          "days_since_last": whole_days(rest[e.event]) if e.event in rest else None,
-         "figures": e.known, **e.doubts.record()}
+         "figures": e.known, **weighed(e.doubts).record()}
         | ({} if figure is None else {"value": value_of(e, figure, basis), "figure": figure}) for e in entries
     ]  # fmt: skip
     if json:

@@ -8,10 +8,12 @@ import typer
 
 from ..options import JSON
 from ..output import print_doubts, print_json, provenance, say
-from .store_options import BASIS, FIGURE, KIND, LIMIT, STORE, WHOSE, without_password
+from ..verb import Asked, verb
+from .store_options import BASIS, FIGURE, KIND, LIMIT, STORE, WHOSE, weighed_all, without_password
 from .tables import print_figure
 
 
+@verb
 def show(
     store: str = STORE,
     figure: str = FIGURE,
@@ -27,7 +29,13 @@ def show(
     from ...trends.entry import BEST
     from ...trends.record import figure_record
 
-    health = health_in(store, craft, kind, limit)
+    if plot is not None:
+        from ...kit.files import check_output
+        from ...plots.figure import PICTURE, picture_kind
+
+        picture_kind(plot)
+        check_output(plot, PICTURE, inputs=[store], force=Asked.force)
+    (health,) = weighed_all([health_in(store, craft, kind, limit)])
     found = (
         [health.figure(figure, basis)]
         if figure

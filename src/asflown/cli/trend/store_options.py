@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import typer
 
+from ..verb import weighed
+
 STORE = typer.Option(..., "--store", help="A path (SQLite) or a URL (sqlite:///…, postgresql://…).")
 KIND = typer.Option(
     None,
@@ -21,3 +23,10 @@ def without_password(store: str) -> str:
     from ...trends.store import label, url_of
 
     return label(url_of(store))
+
+
+def weighed_all(healths: list) -> list:
+    """Verdicts without the doubts that --accept takes off."""
+    from dataclasses import replace
+
+    return [replace(h, doubts=weighed(h.doubts)) for h in healths]

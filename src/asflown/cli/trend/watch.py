@@ -6,10 +6,12 @@ import typer
 
 from ..options import JSON
 from ..output import print_doubts, print_json, provenance, wrapped
-from .store_options import FIGURE, KIND, LIMIT, STORE, WHOSE, without_password
+from ..verb import verb
+from .store_options import FIGURE, KIND, LIMIT, STORE, WHOSE, weighed_all, without_password
 from .tables import print_newest
 
 
+@verb
 def watch(
     store: str = STORE,
     figure: str = FIGURE,
@@ -25,7 +27,7 @@ def watch(
     from ...trends.record import cycles_record, figure_record, shape_record
     from ...trends.verdicts import ORDER
 
-    health = health_in(store, craft, kind, limit, until=event)
+    (health,) = weighed_all([health_in(store, craft, kind, limit, until=event)])
     verdict, reasons = health.verdict, list(health.reasons)
     figures = [f for f in health.figures if f.newest is not None and f.basis in BEST]
     if figure is not None:

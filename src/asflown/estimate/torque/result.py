@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from importlib.metadata import version
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -12,7 +11,6 @@ from ...kit.digits import interval, plus_minus, scaled_unit
 from ...kit.ensemble import spread
 from ...kit.files import write_text
 from ...kit.peaks import PEAK_REACH_S, excursions, heights
-from ...kit.plain import plain
 from ...kit.result import Estimate, Series, per_spin_inertia
 from ...kit.schema import Annotated, Doc, Interval, NotRequired, Number, Numbers, Rows, TypedDict
 from ...kit.table import Table
@@ -340,14 +338,8 @@ class TorqueResult(Estimate):
             ]
         columns = [("time [s]", self.time_s)]
         columns += [(f"{n}{suffix}_{AXES[j]} [{u}]", v[:, j]) for n, v, u in named if v is not None for j in self.axes]
-        lines = [
-            f"# epoch: {self.epoch}",
-            f"# disturbance torque on the body, body axes; craft {self.craft}; {self.method}, {self.variant}",
-            *(f"# DOUBT ({d.severity.label}) {d}" for d in self.doubts),
-            *(f"# input {i.file} sha256 {i.sha256}" for i in self.inputs),
-            f"# asflown {version('asflown')}, options {plain(self.options)}",
-            ",".join(name for name, _ in columns),
-        ]
+        what = f"disturbance torque on the body, body axes; craft {self.craft}; {self.method}, {self.variant}"
+        lines = [*self._remarks(what), ",".join(name for name, _ in columns)]
         rows = zip(*(v for _, v in columns), strict=True)
         lines += [",".join(repr(float(v)) if np.isfinite(v) else "" for v in row) for row in rows]
         write_text(path, "\n".join(lines) + "\n")

@@ -3,8 +3,8 @@
 from .closed_loop import Flight, fly
 from .cover import MovingPart, momentum_per_rate, moving_part
 from .sensors import stream
-from .write import write_flight
+from .write import check_flight, check_record, digests, write_flight
 
 __all__ = [
-    "Flight", "MovingPart", "fly", "momentum_per_rate", "moving_part", "stream", "write_flight",
+    "Flight", "MovingPart", "check_flight", "check_record", "digests", "fly", "momentum_per_rate", "moving_part", "stream", "write_flight",
 ]  # fmt: skip

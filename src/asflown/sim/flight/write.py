@@ -3,30 +3,72 @@
 from __future__ import annotations
 
 import json
+import os
 import platform
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
-from ...kit.files import write_text
+from ...kit.files import check_folder, check_output, mark, sha256_of, sha256_of_file, together, write_text
 from ...kit.timeline import utc_label
 from ...telemetry.channels import AXES
-from ...telemetry.write import write_table
+from ...telemetry.write import table_text
 from .faults import true_drag
 from .world import acting_dipole, acting_drag, acting_sunlight, reference_density
 
+#: What a flight's truth.json calls itself (see ``kit.files.is_ours``).
+FLIGHT = "flight"
 
-def write_flight(flight, directory: str | Path) -> dict[str, Path]:
+
+def write_flight(flight, directory: str | Path, *, force: bool = False) -> dict[str, Path]:
     """telemetry.csv, truth.csv and truth.json in ``directory``; returns their paths by name.
 
-    Each file appears whole or not at all.  Raises BadInput where the directory cannot be written."""
+    All appear, or none.  ``force``: files there that are no flight of ours are replaced.  Raises BadInput where they are not, and
+    where the directory cannot be written."""
     folder = Path(directory)
+    check_flight(folder, force=force)
     files = {"telemetry": folder / "telemetry.csv", "truth": folder / "truth.csv", "truth_json": folder / "truth.json"}
-    write_text(files["truth"], truth_table(flight))  # makes the directory
-    write_table(flight.telemetry, files["telemetry"])
-    write_text(files["truth_json"], json.dumps(truth_record(flight), indent=1, allow_nan=False) + "\n")
+    telemetry, truth = table_text(flight.telemetry), truth_table(flight)
+    record = (
+        {"file": mark(FLIGHT)}
+        | truth_record(flight)
+        | {"files": digests({"telemetry.csv": telemetry, "truth.csv": truth})}
+    )
+    with together():
+        write_text(files["truth"], truth)
+        write_text(files["telemetry"], telemetry)
+        write_text(files["truth_json"], json.dumps(record, indent=1, allow_nan=False) + "\n")
     return files
+
+
+def check_flight(folder: Path, *, force: bool = False, inputs=()) -> None:
+    """Raise BadInput where a flight written into ``folder`` would replace files that are no flight of ours, or not as it was written."""
+    check_folder(folder)
+    check_record(folder / "truth.json", FLIGHT, ("telemetry.csv", "truth.csv"), force=force, inputs=inputs)
+
+
+def check_record(record: Path, kind: str, names, *, force: bool, inputs) -> None:
+    """The same for any ``record`` that keeps the digests of the files beside it, by ``names`` within its folder."""
+    check_output(record, kind, force=force, inputs=inputs)
+    written = {} if force else _digests_in(record)
+    for name in names:
+        place = record.parent / name
+        known = not force and os.path.isfile(place) and written.get(name) == sha256_of_file(place)
+        check_output(place, kind, force=force, inputs=inputs, ours=known)
+
+
+def _digests_in(record: Path) -> dict:
+    try:
+        found = json.loads(record.read_bytes()).get("files")
+        return found if isinstance(found, dict) else {}
+    except (OSError, ValueError, AttributeError, RecursionError):
+        return {}
+
+
+def digests(texts: dict[str, str]) -> dict[str, str]:
+    """SHA-256 of every text as it stands in its file."""
+    return {name: sha256_of(text.encode()) for name, text in texts.items()}
 
 
 def truth_table(flight) -> str:

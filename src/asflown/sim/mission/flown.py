@@ -15,11 +15,11 @@ from ...craft.load import load_craft
 from ...craft.model import Craft
 from ...kit.doubts import Doubt, Doubts, grouped
 from ...kit.errors import BadInput
-from ...kit.files import check_folder, write_text
+from ...kit.files import check_folder, mark, together, write_text
 from ...kit.schema import Annotated, Doc, DoubtRecord, TypedDict
 from ...kit.timeline import utc_to_tai_ns
-from ...telemetry.write import write_table
-from ..flight import fly, stream
+from ...telemetry.write import table_text
+from ..flight import check_record, digests, fly, stream
 from ..scenario import CoverMotion, Scenario, load_scenario
 from .ageing import Figures, aged, figures_of
 from .mission import Actuation, Cold, Fault, Mission, load_mission
@@ -27,6 +27,8 @@ from .mission import Actuation, Cold, Fault, Mission, load_mission
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+#: What a mission's mission.json calls itself (see ``kit.files.is_ours``).
+MISSION = "mission"
 #: truth.csv of an event has a row this often, not one a control cycle as a flight's own. [s]
 TRUTH_EVERY_S = 0.5
 
@@ -77,11 +79,12 @@ def fly_mission(
     noise: str | None = None,
     progress: Callable[[str], None] | None = None,
     changes: dict | None = None,
+    force: bool = False,
 ) -> MissionRecord:
     """Fly every actuation of a mission and write telemetry and truth into a folder.
 
-    Writes <event>/telemetry.csv and <event>/truth.csv (every half second) for each event flown, then mission.json with the
-    truth, and last events.toml: where that stands, all the rest does.  The same mission and seed give the same files on one
+    Writes <event>/telemetry.csv and <event>/truth.csv (every half second) for each event flown, events.toml, and mission.json with
+    the truth: all of them at the end, or none.  The same mission and seed give the same files on one
     machine with the same package versions.
 
     Parameters
@@ -100,6 +103,8 @@ def fly_mission(
         Called with a line of text now and then.
     changes : dict, optional
         Values of the mission to replace, written as in its TOML: ``{"scatter": {"impulse_percent": 0.0}}``.
+    force : bool
+        Files in the folder that are no mission of ours are replaced too.
 
     Returns
     -------
@@ -117,29 +122,42 @@ def fly_mission(
     mission = mission.changed(**changes) if changes else mission
     craft = craft if isinstance(craft, Craft) else load_craft(craft or mission.craft)
     folder = Path(out)
-    check_folder(folder)
+    check_mission(folder, mission, force=force)
     planned = plan_mission(mission, craft)
     if progress is not None:
         progress(f"{mission.name}: {len(planned)} flights, {len(mission.events)} actuations in all")
+    return _flown(mission, craft, planned, folder, progress or (lambda _: None))
 
-    (folder / "events.toml").unlink(missing_ok=True)  # an old list must not stand beside new flights
+
+def check_mission(folder: Path, mission: Mission, *, force: bool = False, inputs=()) -> None:
+    """Raise BadInput where a mission flown into ``folder`` would replace files that are no mission of ours, or not as it was written."""
+    check_folder(folder)
+    tables = [f"{e.name}/{name}" for e in mission.flown for name in ("truth.csv", "telemetry.csv")]
+    check_record(folder / "mission.json", MISSION, ["events.toml", *tables], force=force, inputs=inputs)
+
+
+def _flown(mission: Mission, craft: Craft, planned, folder: Path, progress: Callable[[str], None]) -> MissionRecord:
+    """Fly every event and write its files, then those of the mission."""
     records: list[dict] = []
+    texts: dict[str, str] = {}
     doubts: list[Doubt] = []
     for number, p in enumerate(planned, start=1):
         flight = fly(p.scenario, craft=craft)
         if flight.truth.time_s[-1] < p.cover.motor_off:
             raise BadInput(f"event {p.event.name!r}: {flight.ended}", remedy="Lower most_wheel_rate.")
         true = figures_of(flight.truth.time_s, flight.truth.torque_Nm[:, 1], p.cover.motor_on)
-        write_text(folder / p.event.name / "truth.csv", _thinned_truth(flight))
-        write_table(flight.telemetry, folder / p.event.name / "telemetry.csv")
+        texts |= {f"{p.event.name}/truth.csv": _thinned_truth(flight), f"{p.event.name}/telemetry.csv": table_text(flight.telemetry)}  # fmt: skip
         records.append(_event_record(p, flight, true))
         doubts += flight.doubts
-        if progress is not None:
-            progress(f"{number:3d} of {len(planned)}  {p.event.name}: impulse {true.impulse_Nms:+.3f} N m s, "
-                     f"excursions {1e3 * true.peak_positive_Nm:+.1f} and {1e3 * true.peak_negative_Nm:+.1f} mN m")  # fmt: skip
+        progress(f"{number:3d} of {len(planned)}  {p.event.name}: impulse {true.impulse_Nms:+.3f} N m s, "
+                 f"excursions {1e3 * true.peak_positive_Nm:+.1f} and {1e3 * true.peak_negative_Nm:+.1f} mN m")  # fmt: skip
     record = _mission_record(mission, craft, records, doubts)
-    write_text(folder / "mission.json", json.dumps(record, indent=1, allow_nan=False) + "\n")
-    write_text(folder / "events.toml", _event_list(mission, planned))
+    texts["events.toml"] = _event_list(mission, planned)
+    told = {"file": mark(MISSION)} | record | {"files": digests(texts)}
+    with together():
+        for name, text in texts.items():
+            write_text(folder / name, text)
+        write_text(folder / "mission.json", json.dumps(told, indent=1, allow_nan=False) + "\n")
     return record
 
 
