@@ -72,9 +72,10 @@ def numbers_of(table: Table, column: int, channel: str) -> tuple[np.ndarray, np.
         masked = isinstance(cells, np.ma.MaskedArray)
         rows = np.flatnonzero(~np.ma.getmaskarray(cells)) if masked else np.arange(len(cells))
         values = np.asarray(cells.data[rows] if masked else cells, float)
-        nan = np.isnan(values)
-        said_nan = rows[nan] if masked else rows[:0]
-        if nan.any():
+        said_nan = rows[:0]
+        if len(values) and np.isnan(np.min(values)):
+            nan = np.isnan(values)
+            said_nan = rows[nan] if masked else rows[:0]
             rows, values = rows[~nan], values[~nan]
     else:
         rows, texts = _sampled(cells)
@@ -89,7 +90,7 @@ def numbers_of(table: Table, column: int, channel: str) -> tuple[np.ndarray, np.
                 remedy="Write a number, or leave the cell blank where the channel was not sampled.",
             )
         rows, values, said_nan = rows[~nan], values[~nan], rows[nan]
-    if not np.isfinite(values).all():
+    if len(values) and not (np.isfinite(np.min(values)) and np.isfinite(np.max(values))):
         bad = int(np.flatnonzero(~np.isfinite(values))[0])
         raise BadInput(
             f"{_shown(cells[rows[bad]])} is not finite",
