@@ -257,7 +257,7 @@ def _without_fills(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     fill, rest = np.zeros(len(values), bool), values
     for _ in range(3):  # more than one fill value may occur, the farthest first
         centre = float(np.median(_few(rest)))
-        low, high = float(np.min(rest)), float(np.max(rest))
+        low, high = c.extremes if rest is values else (float(np.min(rest)), float(np.max(rest)))
         far = high if high - centre > centre - low else low
         if far == 0 or np.count_nonzero(rest == far) < 2:
             break
@@ -297,7 +297,7 @@ def _without_plateaus(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     if c.kind.stem not in _MEASURED or len(c.values) < _FEWEST:
         return c, []
     flat = np.zeros(len(c.values), bool)
-    for extreme in (np.max(c.values), np.min(c.values)):
+    for extreme in c.extremes[::-1]:
         at_end = c.values == extreme
         if np.count_nonzero(at_end) < _PLATEAU:
             continue
@@ -328,7 +328,7 @@ def _without_spikes(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     x = c.values
     bend = np.diff(x, 2)
     np.abs(bend, out=bend)  # of samples 1 to n - 2: twice the height over both neighbours
-    sigma = max(float(np.median(_few(bend))), 1e-12 * max(float(x.max()), -float(x.min()))) / _MEDIAN_OF_SECOND
+    sigma = max(float(np.median(_few(bend))), 1e-12 * max(abs(e) for e in c.extremes)) / _MEDIAN_OF_SECOND
     at = np.flatnonzero(bend > 2 * SPIKE_SIGMAS * max(sigma, step / 2)) + 1
     around = [x[np.clip(at + k, 0, n - 1)] for k in (-2, -1, 1, 2)]
     alike = c.valid[at]
@@ -391,7 +391,7 @@ def _without_repeats(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     count = np.count_nonzero(same)
     if count in (0, len(same)):
         return c, []
-    step = max(step, 1e-15 * max(float(v.max()), -float(v.min())))
+    step = max(step, 1e-15 * max(abs(e) for e in c.extremes))
     moves = _few_moves(v)
     if float(np.median(moves)) < _FINE * step:
         return c, []
@@ -433,10 +433,11 @@ def _repeats_per_move(moves: np.ndarray, step: float) -> float:
 
 def _falls(c: Channel) -> list[Finding]:
     """Cumulative counts that decrease, and sawteeth: undeclared wraps or resets."""
-    x, t = c.usable.values, c.usable.tai_ns
+    c = c.usable
+    x, t = c.values, c.tai_ns
     if len(x) < 6:
         return []
-    swung, most = c.kind.stem in ("wheel_rate", "attitude_error"), 0.75 * float(np.ptp(x))
+    swung, most = c.kind.stem in ("wheel_rate", "attitude_error"), 0.75 * (c.extremes[1] - c.extremes[0])
     if not (swung or c.kind.stem == "accelerometer_count" or c.kind.behaves == "cumulative"):
         return []
     jump = np.diff(x)
@@ -503,7 +504,7 @@ def _frames(channels: dict[str, Channel], stems: frozenset[str]) -> list[list[st
 def _without_repeated_frames(channels: dict[str, Channel], steps: dict[str, float]):
     """Instants at which all noisy channels sampled together repeat their previous values."""
     channels, findings = dict(channels), []
-    moving = {n: c for n, c in channels.items() if n in steps and c.values.min() < c.values.max()}
+    moving = {n: c for n, c in channels.items() if n in steps and c.extremes[0] < c.extremes[1]}
     for names in _frames(moving, _MEASURED):
         values = [channels[n].values for n in names]
         whole = values[0][1:] == values[0][:-1]
@@ -620,7 +621,7 @@ def _implausible(channels: dict[str, Channel], craft) -> list[Doubt]:
             limit, whose = _OVER_LIMIT * limits[c.member], f"{craft.name}'s wheel rate limit"
         if limit is None or not c.valid.any():
             continue
-        if -limit <= c.values.min() and c.values.max() <= limit:
+        if -limit <= c.extremes[0] and c.extremes[1] <= limit:
             continue
         size = np.abs(c.usable.values)
         if np.mean(size > limit) > _FEW:  # a short outlier is not a wrong unit
