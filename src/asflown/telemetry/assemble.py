@@ -104,7 +104,7 @@ def channel_from(table: Table, use: Use, tai_ns: np.ndarray, findings: list[Find
         if use.fills:
             fill = np.isin(values, use.fills)
             declared, rows, values = np.union1d(declared, rows[fill]), rows[~fill], values[~fill]
-        if len(values) and np.max(np.abs(values)) > _LARGEST:
+        if len(values) and max(float(np.max(values)), -float(np.min(values))) > _LARGEST:
             row = int(rows[np.argmax(np.abs(values))])
             raise BadInput(
                 "the value is too large for a measurement",

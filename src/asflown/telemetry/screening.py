@@ -274,16 +274,15 @@ def _without_fills(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
 def _far_off(c: Channel, step: float) -> np.ndarray:
     """Samples of a value that recurs far outside the range of all others, which are alike before and after it."""
     values = c.values
-    fill = np.zeros(len(values), bool)
+    fill, rest = np.zeros(len(values), bool), values
     for _ in range(3):  # more than one fill value may occur, the farthest first
-        rest = values[~fill] if fill.any() else values
         centre = float(np.median(_few(rest)))
-        low, high = float(np.min(rest)), float(np.max(rest))
+        low, high = c.extremes if rest is values else (float(np.min(rest)), float(np.max(rest)))
         far = high if high - centre > centre - low else low
-        here = (values == far) & ~fill
         known = far != 0 and _is_known(c, far)
-        if np.count_nonzero(here) < (1 if known else 2) or far == 0:
+        if far == 0 or np.count_nonzero(rest == far) < (1 if known else 2):
             break
+        here = (values == far) & ~fill
         others = values[~fill & ~here]
         if len(others) < _FEWEST:
             break
@@ -292,9 +291,9 @@ def _far_off(c: Channel, step: float) -> np.ndarray:
             break
         if not known and not _comes_back(values, here, fill, 0.2 * abs(far - centre)):
             break
-        if here.sum() == 1 and not (here[0] or here[-1]):
+        if np.count_nonzero(here) == 1 and not (here[0] or here[-1]):
             break  # a single sample within is a spike
-        fill |= here
+        fill, rest = fill | here, others
     return fill
 
 
@@ -360,7 +359,7 @@ def _without_plateaus(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     if c.kind.stem not in _MEASURED or len(c.values) < _FEWEST:
         return c, []
     flat = np.zeros(len(c.values), bool)
-    for extreme in (np.max(c.values), np.min(c.values)):
+    for extreme in c.extremes[::-1]:
         at_end = c.values == extreme
         if np.count_nonzero(at_end) < _PLATEAU:
             continue
@@ -389,8 +388,9 @@ def _without_spikes(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     if c.kind.behaves == "steps" or n < _FEWEST:
         return c, []
     x = c.values
-    bend = np.abs(np.diff(x, 2))  # of samples 1 to n - 2: twice the height over both neighbours
-    sigma = max(float(np.median(_few(bend))), 1e-12 * max(float(x.max()), -float(x.min()))) / _MEDIAN_OF_SECOND
+    bend = np.diff(x, 2)
+    np.abs(bend, out=bend)  # of samples 1 to n - 2: twice the height over both neighbours
+    sigma = max(float(np.median(_few(bend))), 1e-12 * max(abs(e) for e in c.extremes)) / _MEDIAN_OF_SECOND
     at = np.flatnonzero(bend > 2 * SPIKE_SIGMAS * max(sigma, step / 2)) + 1
     around = [x[np.clip(at + k, 0, n - 1)] for k in (-2, -1, 1, 2)]
     alike = c.valid[at]
@@ -449,21 +449,26 @@ def _without_repeats(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     """Short runs of one value in a noisy channel, more frequent than quantisation produces."""
     if c.kind.stem not in _MEASURED | {"control_torque"} or len(c.values) <= 20:
         return c, []
-    change = np.diff(c.values)
-    if change.all() or not change.any():
+    v = c.values
+    same = v[1:] == v[:-1]
+    count = np.count_nonzero(same)
+    if count in (0, len(same)):
         return c, []
-    step = max(step, 1e-15 * float(np.max(np.abs(c.values))))
-    moves = np.abs(change[change != 0])
-    if float(np.median(_few(moves))) < _FINE * step:
+    step = max(step, 1e-15 * max(abs(e) for e in c.extremes))
+    moves = _few_moves(v)
+    if float(np.median(moves)) < _FINE * step:
         return c, []
-    starts, stops = _runs_of(change == 0)
-    inside = (starts > 0) & (stops < len(change)) & (stops - starts < STUCK_RUN - 1)
+    starts, stops = _runs_of(same)
+    inside = (starts > 0) & (stops < len(same)) & (stops - starts < STUCK_RUN - 1)
     starts, stops = starts[inside], stops[inside]
-    alone = np.minimum(np.abs(change[starts - 1]), np.abs(change[stops])) > 3 * step
+    alone = np.minimum(np.abs(v[starts] - v[starts - 1]), np.abs(v[stops + 1] - v[stops])) > 3 * step
     starts, stops = starts[alone], stops[alone]
-    if len(starts) == 0 or scipy.special.pdtrc(len(starts) - 1, _zeros_by_chance(moves, step)) > CHANCE:
+    if len(starts) == 0:
         return c, []
-    edges = np.zeros(len(c.values) + 1, np.int64)
+    by_chance = (len(same) - count) * _repeats_per_move(moves, step)
+    if scipy.special.pdtrc(len(starts) - 1, by_chance) > CHANCE:
+        return c, []
+    edges = np.zeros(len(v) + 1, np.int64)
     edges[starts + 1] += 1
     edges[stops + 1] -= 1
     repeated = np.cumsum(edges[:-1]) > 0
@@ -475,37 +480,46 @@ def _without_repeats(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     return _marked(c, repeated, "repeat", "samples repeat the previous value bit for bit: stale, not used")
 
 
-def _zeros_by_chance(moves: np.ndarray, step: float) -> float:
-    """Samples that repeat from quantisation alone: no change is about as frequent as any other small change of one step."""
-    width = max(5 * step, float(np.quantile(_few(moves), 0.1)))
-    return float(1.5 * np.sum(moves <= width) * step / (2 * width))
+def _few_moves(values: np.ndarray) -> np.ndarray:
+    """Sizes of the changes from one sample to the next, of those that change; of a long record evenly chosen ones."""
+    each = len(values) // _LEVELS_FROM + 1
+    change = np.abs(values[1::each] - values[:-1:each])
+    return change[change > 0]
+
+
+def _repeats_per_move(moves: np.ndarray, step: float) -> float:
+    """Samples that repeat from quantisation alone, for each that moves: no change is about as frequent as any other small change of
+    one step."""
+    width = max(5 * step, float(np.quantile(moves, 0.1)))
+    return float(1.5 * np.mean(moves <= width) * step / (2 * width))
 
 
 def _falls(c: Channel) -> list[Finding]:
     """Cumulative counts that decrease, and sawteeth: undeclared wraps or resets."""
-    x, t = c.usable.values, c.usable.tai_ns
+    c = c.usable
+    x, t = c.values, c.tai_ns
     if len(x) < 6:
         return []
+    swung, most = c.kind.stem in ("wheel_rate", "attitude_error"), 0.75 * (c.extremes[1] - c.extremes[0])
+    if not (swung or c.kind.stem == "accelerometer_count" or c.kind.behaves == "cumulative"):
+        return []
     jump = np.diff(x)
+    if swung and -most <= jump.min() and jump.max() <= most:
+        return []
     if c.kind.stem == "accelerometer_count":  # counts down as well as up, by thrust and by its own bias
         hit = np.abs(jump) > max(0.5 * float(np.ptp(x)), 50 * float(np.median(np.abs(jump))) + 1)
         detail = "jumps over much of its range: a wrap (declare it in a channel dictionary) or a reset"
     elif c.kind.behaves == "cumulative":
         hit = jump < 0
         detail = "decreases although it is cumulative: a wrap (declare it in a channel dictionary) or a reset"
-    elif c.kind.stem in ("wheel_rate", "attitude_error"):
-        hit = np.abs(jump) > 0.75 * np.ptp(x)
-        if not hit.any():
-            return []
+    else:
         noise = sample_noise(c)
-        hit &= np.abs(jump) > 50 * noise
+        hit = np.abs(jump) > max(most, 50 * noise)
         for i in np.flatnonzero(hit):
             before, after = jump[max(0, i - 5) : i], jump[i + 1 : i + 6]
             drift = [np.sign(d.mean()) if len(d) and np.abs(d.sum()) > 3 * noise else 0 for d in (before, after)]
             hit[i] = drift[0] == drift[1] == -np.sign(jump[i])
         detail = "jumps over its whole range against its own drift: an undeclared wrap?"
-    else:
-        return []
     if not hit.any():
         return []
     first = int(np.flatnonzero(hit)[0])
@@ -553,7 +567,7 @@ def _frames(channels: dict[str, Channel], stems: frozenset[str]) -> list[list[st
 def _without_repeated_frames(channels: dict[str, Channel], steps: dict[str, float]):
     """Instants at which all noisy channels sampled together repeat their previous values."""
     channels, findings = dict(channels), []
-    moving = {n: c for n, c in channels.items() if n in steps and c.values.min() < c.values.max()}
+    moving = {n: c for n, c in channels.items() if n in steps and c.extremes[0] < c.extremes[1]}
     for names in _frames(moving, _MEASURED):
         values = [channels[n].values for n in names]
         whole = values[0][1:] == values[0][:-1]
@@ -582,11 +596,10 @@ def _without_repeated_frames(channels: dict[str, Channel], steps: dict[str, floa
 
 def _repeats_by_chance(values: np.ndarray, step: float) -> float:
     """Share of the samples that repeat the last one by chance; a fine channel does so seldom."""
-    change = np.diff(values)
-    share, moves = float(np.mean(change == 0)), np.abs(change[change != 0])
-    if float(np.median(_few(moves))) < _FINE * step:
+    share, moves = float(np.mean(values[1:] == values[:-1])), _few_moves(values)
+    if float(np.median(moves)) < _FINE * step:
         return share
-    return min(share, _zeros_by_chance(moves, max(step, 1e-15)) / change.size)
+    return min(share, (1 - share) * _repeats_per_move(moves, max(step, 1e-15)))
 
 
 def _without_unfilled(channels: dict[str, Channel]) -> tuple[dict[str, Channel], list[Finding]]:
@@ -691,7 +704,7 @@ def _implausible(channels: dict[str, Channel], craft) -> list[Doubt]:
             limit, whose = _OVER_LIMIT * limits[c.member], f"{craft.name}'s wheel rate limit"
         if limit is None or not c.valid.any():
             continue
-        if -limit <= c.values.min() and c.values.max() <= limit:
+        if -limit <= c.extremes[0] and c.extremes[1] <= limit:
             continue
         size = np.abs(c.usable.values)
         if np.mean(size > limit) > _FEW:  # a short outlier is not a wrong unit

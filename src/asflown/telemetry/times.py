@@ -118,15 +118,19 @@ def exact_of_numbers(values: np.ndarray, scale: Scale) -> np.ndarray | None:
             continue
         whole = np.rint(values.astype(float) * power)
         # a decimal of 15 digits and its double are one to one; integers beyond are left to the decimals
-        if power > factor * 100 or not (np.abs(whole) < 9e14).all() or not (whole / power == values).all():
+        largest = max(float(np.max(whole, initial=0)), -float(np.min(whole, initial=0)))
+        if power > factor * 100 or not largest < 9e14 or not (whole / power == values).all():
             continue
         origin = scale.origin * power
         if (
             origin == int(origin)
             and factor % power == 0
-            and np.max(np.abs(whole - float(origin)), initial=0) * (factor // power) < _LONGEST_NS
+            and (largest + float(origin)) * (factor // power) < 2 * _LONGEST_NS
         ):
-            return (whole.astype(np.int64) - int(origin)) * (factor // power)
+            ns = whole.astype(np.int64)
+            ns -= int(origin)
+            ns *= factor // power
+            return ns if np.max(np.abs(ns), initial=0) < _LONGEST_NS else None
     return None
 
 
