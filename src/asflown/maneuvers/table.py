@@ -19,16 +19,10 @@ from .adjust import SCALE, Adjustment, Ledger, entered, scale_corrected
 from .columns import Columns, read_table
 from .frame import SMALLEST, resolved, tvc_axes
 from .history import engine_called
+from .plausible import check_directions, engine_turns, implausible
 
 #: Parts of the expected dV, each rounded to 0.1 mm/s, add up to it within this. [m/s]
 _ROUNDED = 2e-4
-#: A median error beyond this share of the dV is rather a wrong unit.
-_BEYOND_BELIEF = 0.3
-#: A median error below this share of the dV, of at least so many burns, is beyond any engine.
-_TOO_SMALL, _SEVERAL = 2e-5, 5
-#: A maneuver this large is rarer than a wrong unit. [m/s]
-_LARGEST_DV = 3000.0
-
 NO_MAGNITUDE_SIGMA = Kind(
     "maneuvers.no-magnitude-sigma", Severity.CAUTION,
     "sigma_magnitude is zero throughout: errors of the orbit determination count as execution errors",
@@ -43,29 +37,10 @@ NO_POINTING = Kind(
     "maneuvers.no-pointing", Severity.NOTE, "the table has no pointing errors: pointing is not estimated",
     "Give pointing_error_x and pointing_error_y.",
 )  # fmt: skip
-LARGE_ERRORS = Kind(
-    "maneuvers.large-errors", Severity.SUSPECT,
-    "the median magnitude error is {share_percent:.0f} % of the dV: is a unit in the headings wrong?",
-    "Check the units in the headings.",
-)  # fmt: skip
 ENGINE_SPELLINGS = Kind(
     "maneuvers.engine-spellings", Severity.NOTE, "{spellings} are taken for one engine, {engine}",
     "Write each engine's name in one way.",
 )  # fmt: skip
-REPEATED_ROWS = Kind(
-    "maneuvers.repeated-rows", Severity.SUSPECT,
-    "{count} rows have the dV, error and sigma of another row: is the table listed twice?", "Leave the copies out.",
-)  # fmt: skip
-SMALL_ERRORS = Kind(
-    "maneuvers.small-errors", Severity.SUSPECT,
-    "the median magnitude error is {share:.1g} of the dV, far below what engines reach: is a unit in the headings wrong?",
-    "Check the units in the headings.",
-)  # fmt: skip
-LARGE_DV = Kind(
-    "maneuvers.large-dv", Severity.SUSPECT,
-    "the largest dV is {largest_mps:.4g} m/s: are the values mm/s labelled m/s?", "Check the unit of the dV.",
-)  # fmt: skip
-
 
 @dataclass(frozen=True)
 class Maneuvers:
@@ -217,7 +192,8 @@ def load_maneuvers(path: str | Path) -> Maneuvers:
         found = _vectors(columns) if columns.has("reconstructed_dv") else _scalars(columns)
         excluded = tuple((i, reason) for i, reason in zip(ids, reasons, strict=True) if reason)
         found = replace(found, source=str(path), inputs=(Input(str(path), sha256_of(data)),), excluded=excluded)
-        return _doubted(_one_spelling(_in_order(found)))
+        found = _one_spelling(_in_order(found))
+        return replace(found, doubts=found.doubts + Doubts(implausible(found)))
     except BadInput as why:
         raise why.within(path) from None
 
@@ -257,12 +233,7 @@ def _scalars(columns: Columns) -> Maneuvers:
     _positive(columns, "dv", dv)
     _not_negative(columns, "sigma_magnitude", sigma)
     pointing, covariance, unsure = _pointing(columns)
-    share = float(np.median(np.abs(error) / dv))
-    doubts = [
-        None if sigma.any() else NO_MAGNITUDE_SIGMA(),
-        unsure,
-        LARGE_ERRORS(share_percent=100 * share) if share > _BEYOND_BELIEF else None,
-    ]
+    doubts = [None if sigma.any() else NO_MAGNITUDE_SIGMA(), unsure]
     return Maneuvers(
         _ids(columns), columns.words("engine"), dv, error, sigma, pointing, covariance, columns.times(), _books(columns),
         doubts=Doubts(doubts),
@@ -344,10 +315,12 @@ def _vectors(columns: Columns) -> Maneuvers:
             for book, c, who in zip(books, ratio, ids, strict=True)
         )
     axes = tvc_axes(expected, craft_x, ids)
+    check_directions(recon, expected, ids)
+    engines = columns.words("engine")
     error, pointing, sigma, pointing_covariance = resolved(recon, expected, covariance, axes)
     return Maneuvers(
-        ids, columns.words("engine"), np.linalg.norm(expected, axis=1), error, sigma, pointing, pointing_covariance,
-        columns.times(), books,
+        ids, engines, np.linalg.norm(expected, axis=1), error, sigma, pointing, pointing_covariance,
+        columns.times(), books, doubts=Doubts(engine_turns(expected, craft_x, engines)),
     )  # fmt: skip
 
 
@@ -393,18 +366,3 @@ def _one_spelling(found: Maneuvers) -> Maneuvers:
     usual = {name: names.most_common(1)[0][0] for names in spellings.values() for name in names}
     told = [ENGINE_SPELLINGS(spellings=some_of(sorted(names)), engine=names.most_common(1)[0][0]) for names in several]
     return replace(found, engine=tuple(usual[n] for n in found.engine), doubts=found.doubts + Doubts(told))
-
-
-def _doubted(found: Maneuvers) -> Maneuvers:
-    """With what the numbers themselves make doubtful: rows that occur twice, errors far too small for the dV."""
-    rows = Counter(
-        zip(found.dv_mps.tolist(), found.magnitude_error_mps.tolist(), found.sigma_magnitude_mps.tolist(), strict=True)
-    )
-    twice = sum(n - 1 for n in rows.values())
-    share = float(np.median(np.abs(found.magnitude_error_mps) / found.dv_mps))
-    doubts = [
-        REPEATED_ROWS(count=twice) if twice else None,
-        SMALL_ERRORS(share=share) if len(found) >= _SEVERAL and share < _TOO_SMALL else None,
-        LARGE_DV(largest_mps=float(found.dv_mps.max())) if found.dv_mps.max() > _LARGEST_DV else None,
-    ]
-    return replace(found, doubts=found.doubts + Doubts(doubts))

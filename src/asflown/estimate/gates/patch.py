@@ -14,6 +14,7 @@ from ...kit.errors import BadInput
 from ...kit.result import Estimate, recorded, with_old_keys
 from ...kit.schema import Annotated, Doc, Number, TypedDict
 from ...kit.table import Table
+from ...maneuvers.adjust import SCALE
 from ...maneuvers.model import Quantity
 from .checks import sign_test
 from .likelihoods import problems
@@ -35,6 +36,12 @@ EPOCHS_DIFFER = Kind(
     "with the bias taken out, the errors before and after {burn} still differ (p = {p:.2g}): the patch changed something else, "
     "or the two epochs do not have one model",
     "Fit the epochs apart.",
+)  # fmt: skip
+BIAS_OUT_ALREADY = Kind(
+    "gates.bias-out-already", Severity.SUSPECT,
+    "as flown, the burns before {burn} agree with those from it on (p = {flown_p:.2g}), and with the bias taken out they do not "
+    "(p = {p:.2g}): has it been taken out of the table before?",
+    "Leave --removed out; list what was done to the expected dV in the column 'adjusted'.",
 )  # fmt: skip
 
 
@@ -146,7 +153,7 @@ def gates_patch(
     Raises
     ------
     BadInput
-        Where either side has fewer than four burns, or the ledger says that this bias was taken out before.
+        Where either side has fewer than four burns, or the ledger says that this bias was taken out before, under whatever name.
     """
     m, at = maneuvers, maneuvers.place(first_after)
     if min(at, len(m) - at) < _FEWEST:
@@ -154,14 +161,20 @@ def gates_patch(
             f"{at} burns before {first_after} and {len(m) - at} from it on: too few to compare", file=m.source or None,
             remedy=f"It takes {_FEWEST} on either side.",
         )  # fmt: skip
-    adjusted = m.with_bias_removed(at, removed_fixed_mps, removed_proportional, f"patch before {first_after}")
+    adjusted = m
+    if removed_fixed_mps or removed_proportional:
+        _check_ledger(m, at, first_after)
+        adjusted = m.with_bias_removed(at, removed_fixed_mps, removed_proportional, f"patch before {first_after}")
     point = problems(adjusted)[Quantity.MAGNITUDE].minimum()
     spare = len(m) - 4
-    flown, _, _ = _epoch("before, as flown", m.take(slice(0, at)), point, spare)
+    flown, f, F = _epoch("before, as flown", m.take(slice(0, at)), point, spare)
     before, b, B = _epoch("before, adjusted", adjusted.take(slice(0, at)), point, spare)
     after, a, A = _epoch("after", adjusted.take(slice(at, None)), point, spare)
-    off = a - b
-    difference = float(scipy.stats.f.sf(off @ np.linalg.solve(A + B, off) / 2, 2, spare))
+
+    def differs(off, covariance) -> float:
+        return float(scipy.stats.f.sf(off @ np.linalg.solve(covariance, off) / 2, 2, spare))
+
+    difference, as_flown = differs(a - b, A + B), differs(a - f, A + F)
     return GatesPatch(
         first_after=first_after,
         removed_fixed_mps=removed_fixed_mps,
@@ -169,12 +182,25 @@ def gates_patch(
         epochs=(flown, before, after),
         difference_p=difference,
         maneuvers=adjusted,
-        doubts=Doubts(_doubts(first_after, after, difference)),
+        doubts=Doubts(_doubts(first_after, after, difference, as_flown)),
     )
 
 
-def _doubts(burn: str, after: Epoch, difference_p: float) -> list[Doubt | None]:
+def _check_ledger(m: Maneuvers, at: int, burn: str) -> None:
+    """Raises BadInput where an adjustment is listed for all burns before a patch and for none from it on: it is that patch."""
+    before, after = ([{a.name for a in book if a.name != SCALE} for book in part] for part in (m.ledger[:at], m.ledger[at:]))
+    done = set.intersection(*before) - set.union(*after)
+    if done:
+        raise BadInput(
+            f"the adjustment {sorted(done)[0]!r} has been made already: it is listed for every burn before {burn} and for none from it on",
+            file=m.source or None, channel="adjusted",
+            remedy="Leave --removed out, or take the adjustment out of the column 'adjusted' where it is still to be made.",
+        )  # fmt: skip
+
+
+def _doubts(burn: str, after: Epoch, difference_p: float, flown_p: float) -> list[Doubt | None]:
     return [
+        BIAS_OUT_ALREADY(burn=burn, flown_p=flown_p, p=difference_p) if flown_p > _P > difference_p else None,
         BIAS_LEFT(burn=burn, p=after.bias_p) if after.bias_p < _P else None,
         EPOCHS_DIFFER(burn=burn, p=difference_p) if difference_p < _P else None,
     ]
