@@ -13,7 +13,7 @@ from ..kit.errors import BadInput, some_of
 from ..kit.quantities import numbers, quantity, si_factor
 from ..kit.timeline import utc_to_tai_ns
 from ..telemetry.channels import split_header
-from ..telemetry.formats import read_parquet
+from ..telemetry.formats import read_excel, read_parquet
 from ..telemetry.tables import Table, numbers_of, times_of, words_of
 from ..telemetry.text import read_csv
 from ..telemetry.times import Scale, scale_called
@@ -153,9 +153,11 @@ def _factor(name: str, unit: str) -> float:
 
 
 def read_table(path: Path, data: bytes, entries: str = "maneuver") -> Table:
-    """A table of maneuvers from CSV (plain or gzip), Parquet, or TOML with one ``[[maneuver]]`` each."""
+    """A table of maneuvers from CSV (plain or gzip), Parquet, Excel, or TOML with one ``[[maneuver]]`` each."""
     if data[:4] == b"PAR1":
         return read_parquet(path)
+    if data[:4] == b"PK\x03\x04":
+        return read_excel(path)[0]
     if path.suffix.lower() == ".toml":
         return _from_toml(toml_table(data, None), entries)
     return read_csv(data)

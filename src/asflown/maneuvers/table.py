@@ -14,7 +14,7 @@ from ..kit.config import read_bytes
 from ..kit.doubts import Doubt, Doubts, Kind, Severity
 from ..kit.errors import BadInput, some_of
 from ..kit.files import sha256_of
-from ..kit.result import Input
+from ..kit.result import Input, inputs_of
 from .adjust import SCALE, Adjustment, Ledger, entered, scale_corrected
 from .columns import Columns, read_table
 from .frame import SMALLEST, resolved, tvc_axes
@@ -158,17 +158,20 @@ class Maneuvers:
         return replace(rest, excluded=(*self.excluded, *((self.id[k], reason) for k in sorted(gone))))
 
 
-def load_maneuvers(path: str | Path) -> Maneuvers:
+def load_maneuvers(path, *, columns=None) -> Maneuvers:
     """Read a table of executed maneuvers.
 
     Expected dV are corrected for accelerometer scale or thrust where there is a correction_ratio (Wagner 2014 eqs 6, 7), once.
 
     Parameters
     ----------
-    path : str or Path
-        CSV (plain or gzip), Parquet or TOML; units in the headings; docs/maneuvers.md lists the columns.  It holds errors already
+    path : str or Path, or table
+        CSV (plain or gzip), Parquet, Excel or TOML; or a pandas or polars DataFrame, an xarray Dataset, or a dict of arrays (name ->
+        values, or name -> (values, unit)).  Units are in the headings; docs/maneuvers.md lists the columns.  It holds errors already
         resolved (dv, magnitude_error, sigma_magnitude; pointing_error_x and _y with sigmas and correlation), or inertial
         vectors (reconstructed_dv, expected_dv or its parts, covariance, craft_x).
+    columns : str, Path or dict, optional
+        Dictionary of the columns (TOML, or a dict of the same keys), where the table has other ones; docs/maneuvers.md lists its keys.
 
     Returns
     -------
@@ -180,22 +183,34 @@ def load_maneuvers(path: str | Path) -> Maneuvers:
     BadInput
         For anything that cannot be read, with file, line and column.
     """
-    path = Path(path)
+    of_file = isinstance(path, (str, Path))
+    name = str(path) if of_file else type(path).__name__
     try:
-        data = read_bytes(path, "maneuver table", "Give a CSV, Parquet or TOML file.")
-        whole = Columns(read_table(path, data))
+        if of_file:
+            data = read_bytes(path, "maneuver table", "Give a CSV, Parquet, Excel or TOML file.")
+            table, digest = read_table(Path(path), data), sha256_of(data)
+        else:
+            from ..telemetry.in_memory import digest_of, tables_of
+
+            tables = tables_of(path)
+            table, digest = tables[0], digest_of(tables)
+        if columns is not None:
+            from .dictionary import load_maneuver_dictionary, translated
+
+            table = translated(table, load_maneuver_dictionary(columns))
+        whole = Columns(table)
         whole.need("id")
         ids, reasons = _ids(whole), whole.words("excluded")  # an excluded row may hold blanks or zeros
-        columns = whole.some([k for k, reason in enumerate(reasons) if not reason])
-        if len(columns) == 0:
+        used = whole.some([k for k, reason in enumerate(reasons) if not reason])
+        if len(used) == 0:
             raise BadInput("no maneuver is left", remedy="Leave fewer out.")
-        found = _vectors(columns) if columns.has("reconstructed_dv") else _scalars(columns)
+        found = _vectors(used) if used.has("reconstructed_dv") else _scalars(used)
         excluded = tuple((i, reason) for i, reason in zip(ids, reasons, strict=True) if reason)
-        found = replace(found, source=str(path), inputs=(Input(str(path), sha256_of(data)),), excluded=excluded)
+        found = replace(found, source=name, inputs=(Input(name, digest), *inputs_of(columns)), excluded=excluded)
         found = _one_spelling(_in_order(found))
         return replace(found, doubts=found.doubts + Doubts(implausible(found)))
     except BadInput as why:
-        raise why.within(path) from None
+        raise why.within(name) from None
 
 
 def _ids(columns: Columns) -> tuple[str, ...]:

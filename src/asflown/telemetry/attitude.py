@@ -17,7 +17,7 @@ from ..kit.errors import BadInput
 from ..kit.rotations import rates_between
 from ..kit.timeline import NS
 from .channels import AXES
-from .findings import ERROR_TOO_FAST, NEVER_TOGETHER, RATE_SCALE, TURNS_TOO_LITTLE
+from .findings import ERROR_TOO_FAST, IMPLAUSIBLE, NEVER_TOGETHER, RATE_SCALE, TURNS_TOO_LITTLE
 from .frames import against_rates, commanded_doubt, readings_of
 from .telemetry import BRIDGED, Telemetry, common_instants
 
@@ -44,7 +44,7 @@ def check_attitude(telemetry: Telemetry, readings: dict[str, tuple[np.ndarray, n
     unit is not a wrong direction): misfit S = sum |w - s r|^2, s >= 0; the likelihood of independent residuals
     of unknown size gives (3 M / 2) ln(S / S'), M reduced by the residuals' own correlation.
     Raises BadInput where another reading fits significantly better."""
-    telemetry = _commanded(_error_scale(telemetry))
+    telemetry = _by_a_field(_commanded(_error_scale(telemetry)))
     needed = [f"quaternion_{m}" for m in "wxyz"]
     if not all(n in telemetry for n in needed) or not telemetry.has_axes("body_rate"):
         return telemetry
@@ -207,10 +207,38 @@ def _scale(rate: np.ndarray, w: np.ndarray) -> tuple[float, str] | None:
 def _scales(telemetry: Telemetry, rate: np.ndarray, w: np.ndarray) -> Telemetry:
     """Doubt a unit where rates and attitude are correlated but differ in scale."""
     found = _scale(rate, w)
-    if found is None or not found[1]:
+    if found is None:
         return telemetry
+    if not found[1]:
+        return _plausible(telemetry)
     names = [f"body_rate_{a}" for a in AXES]
     return _doubted(telemetry, RATE_SCALE(channels=names, ratio=found[0], guess=found[1]))
+
+
+def _plausible(telemetry: Telemetry) -> Telemetry:
+    """Without the doubt that the body rates are too large: something else turns as they say, as on a craft that tumbles."""
+    kept = [
+        d for d in telemetry.doubts if d.kind.id != IMPLAUSIBLE.id or not d.about["channels"].startswith("body_rate_")
+    ]
+    return replace(telemetry, doubts=Doubts(kept))
+
+
+def _by_a_field(telemetry: Telemetry) -> Telemetry:
+    """Large body rates against a vector that turns in body axes as the body turns: dB/dt = -w x B, of a magnetic field or the Sun."""
+    if not telemetry.doubts.of(IMPLAUSIBLE) or not telemetry.has_axes("body_rate"):
+        return telemetry
+    for stem in ("magnetic_field", "sun_direction"):
+        if not telemetry.has_axes(stem):
+            continue
+        tai_ns, b = together(telemetry, [f"{stem}_{a}" for a in AXES])
+        w = _at(telemetry, tai_ns[:-1] + np.diff(tai_ns) // 2, "body_rate")
+        if w is None or len(tai_ns) < 10:
+            continue
+        seen = np.diff(b, axis=0) / (np.diff(tai_ns) / NS)[:, None]
+        found = _scale(-np.cross(w, (b[1:] + b[:-1]) / 2), seen)
+        if found is not None and not found[1]:
+            return _plausible(telemetry)
+    return telemetry
 
 
 def _rms(x: np.ndarray) -> float:

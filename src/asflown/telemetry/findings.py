@@ -64,6 +64,11 @@ COMMAND_APART = Kind(
     "the commanded quaternion contradicts the attitude ({off_deg:.0f} degrees, median): {how}",
     "Give commanded_quaternion_w, _x, _y, _z body to inertial, scalar and order as of the quaternion.",
 )  # fmt: skip
+NO_SIGN = Kind(
+    "telemetry.no-sign", Severity.SUSPECT,
+    "{channels}: the rate falls to zero and rises again at the same pace: is it a speed without its sign?",
+    "Give the rate with its sign, or divide the record at the zero and reverse one part.",
+)  # fmt: skip
 NOT_UNIT = Kind(
     "telemetry.sun-not-unit", Severity.SUSPECT,
     "sun_direction has a length of {length:.3g} (median where it is not zero): it must be a unit vector, or zero in shadow",

@@ -88,7 +88,7 @@ def tables_of_dataset(groups: list) -> list[Table]:
             others = [
                 n
                 for n, v in data.variables.items()
-                if v.dims[:1] == (dim,) and n != clock and v.ndim <= 2 and n not in flags
+                if dim in v.dims and n != clock and v.ndim <= 2 and n not in flags
             ]
             if clock is not None and others:
                 tables.append(_coordinate_table(data, clock, others))
@@ -147,11 +147,12 @@ def _check_size(cells: int) -> None:
 def _coordinate_table(data, clock: str, others: list) -> Table:
     heading, epoch, instants = _cf_time(data[clock], data.attrs.get("epoch"))
     headings, blanked = [heading], {}
-    columns: list = [typed(data[clock].values)]
+    times = data[clock].values
+    columns: list = [times.astype("timedelta64[ns]").astype(np.int64) if times.dtype.kind == "m" else typed(times)]
     for name in others:
         variable = data[name]
         unit = said(variable.attrs["units"]) if "units" in variable.attrs else None
-        for member, values in _members(str(name), variable):
+        for member, values in _members(str(name), variable.transpose(data[clock].dims[0], ...)):
             values, out = _declared(values, variable)
             if out.any():
                 blanked[len(columns)] = np.flatnonzero(out)
@@ -203,13 +204,20 @@ def _declared(values, variable) -> tuple[Any, np.ndarray]:
 
 def _clock(data, dim) -> str | None:
     """The variable with the times of a dimension."""
-    if dim in data.variables and data.variables[dim].ndim == 1:
+    if dim in data.variables and data.variables[dim].ndim == 1 and _is_time(str(dim), data.variables[dim]):
         return dim
     named = [
         n for n, v in data.variables.items()
         if v.dims == (dim,) and (v.attrs.get("standard_name") == "time" or str(n) == "time" or str(n).startswith("time_"))
     ]  # fmt: skip
     return named[0] if named else None
+
+
+def _is_time(name: str, variable) -> bool:
+    """Whether a coordinate is one of times, by its units, kind or name."""
+    units = said(variable.attrs.get("units", ""))
+    named = variable.attrs.get("standard_name") == "time" or name.lower().split("_")[0] in ("time", "t")
+    return named or variable.dtype.kind in "Mm" or " since " in units or scale_called(units) is not None
 
 
 def _cf_time(clock, epoch) -> tuple[str, str | None, np.ndarray | None]:
@@ -219,6 +227,8 @@ def _cf_time(clock, epoch) -> tuple[str, str | None, np.ndarray | None]:
     values = np.asarray(clock.values)
     if values.dtype.kind == "M":  # decoded already
         return "time [utc]", None, None
+    if values.dtype.kind == "m":
+        return "time [ns]", None if epoch is None else said(epoch), None
     if not since:
         return f"time [{units}]", None if epoch is None else said(epoch), None
     calendar = said(clock.attrs.get("calendar", "standard")).lower()

@@ -65,6 +65,8 @@ def _of_mapping(data: Mapping) -> Table:
 def _of_frame(data: Any) -> Table:
     import narwhals
 
+    if getattr(getattr(data, "columns", None), "nlevels", 1) > 1:  # a heading in several levels, as (name, unit)
+        data = data.set_axis([" ".join(str(x) for x in c if str(x)) for c in data.columns], axis=1)
     try:
         frame = narwhals.from_native(data, eager_only=True)
     except TypeError:
@@ -75,11 +77,14 @@ def _of_frame(data: Any) -> Table:
     headings = [str(c) for c in frame.columns]
     columns = [typed(_values(frame[c])) for c in frame.columns]
     index = getattr(data, "index", None)
-    if index is not None and not callable(index) and (index.name is not None or index.dtype.kind == "M"):
+    if index is not None and not callable(index) and (index.name is not None or index.dtype.kind in "Mm"):
         dated = index.dtype.kind == "M" or hasattr(index, "tz")
         values = index.tz_convert("UTC").tz_localize(None) if getattr(index, "tz", None) is not None else index
-        headings.insert(0, "time [utc]" if dated else str(index.name))
+        headings.insert(0, "time [utc]" if dated else "time" if index.dtype.kind == "m" else str(index.name))
         columns.insert(0, typed(np.asarray(values)))
+    for j, column in enumerate(columns):
+        if isinstance(column, np.ndarray) and column.dtype.kind == "m":  # elapsed times
+            headings[j], columns[j] = f"{headings[j]} [ns]", column.astype("timedelta64[ns]").astype(np.int64)
     return checked(Table(tuple(headings), tuple(columns)))
 
 

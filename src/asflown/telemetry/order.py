@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 LATE_FEW, LATE_PART = 3, 0.01  # up to this many late samples count as disorder, more as a clock running backwards
 #: A few samples beyond a pause of this many spans of all others, and of this length, are stamped wrongly.
 _FAR_SPANS, _FAR_NS = 100, 86_400 * NS
+#: A clock that was not set yet says a date years before; as many samples as this share may be stamped so.
+_UNSET_NS, _UNSET_PART = 365 * _FAR_NS, 0.3
 #: A second copy of a sample follows within this share of the cadence and differs by less than this share of the noise.
 _AT_ONCE, _ALIKE = 0.2, 0.1
 #: Samples per stamp from which stamps are coarser than the cadence.
@@ -91,7 +93,7 @@ def _plan(c: Channel, telemetry: Telemetry) -> tuple[np.ndarray | None, np.ndarr
     kept = np.setdiff1d(np.arange(len(t)), late)
     span = int(t[kept].max() - t[kept].min())
     off = np.maximum(t[kept].min() - t[late], t[late] - t[kept].max())
-    strays = late[off > max(span, 1000 * c.cadence_ns)]
+    strays = np.union1d(late[off > max(span, 1000 * c.cadence_ns)], _misdated(t, late, c.cadence_ns))
     late = np.setdiff1d(late, strays)
     if len(late) + len(strays) > max(LATE_FEW, LATE_PART * len(t)) or 2 * (len(late) + len(strays)) >= len(t):
         _refuse(c, telemetry, len(late) + len(strays))
@@ -99,6 +101,18 @@ def _plan(c: Channel, telemetry: Telemetry) -> tuple[np.ndarray | None, np.ndarr
     order = used[np.argsort(t[used], kind="stable")]
     beyond = _strays(t[order])
     return np.delete(order, beyond), np.union1d(strays, order[beyond]), late
+
+
+def _misdated(t: np.ndarray, late: np.ndarray, cadence_ns: int) -> np.ndarray:
+    """Runs of late samples that stand in the file where exactly they are missing: their stamps are wrong, not their place."""
+    found = [late[:0]]
+    for run in np.split(late, np.flatnonzero(np.diff(late) != 1) + 1):
+        if len(run) == 0 or run[0] == 0 or run[-1] == len(t) - 1:
+            continue
+        before, after = int(t[run[0] - 1]), int(t[run[-1] + 1])
+        if abs(after - before - (len(run) + 1) * cadence_ns) < cadence_ns // 2:
+            found.append(run)
+    return np.concatenate(found)
 
 
 def _strays(t: np.ndarray) -> np.ndarray:
@@ -109,7 +123,9 @@ def _strays(t: np.ndarray) -> np.ndarray:
     before, after = widest + 1, len(t) - widest - 1
     few = min(before, after)
     span = int(t[-1] - t[widest + 1]) if before < after else int(t[widest] - t[0])
-    if few > max(LATE_FEW, LATE_PART * len(t)) or t[widest + 1] - t[widest] < max(_FAR_SPANS * span, _FAR_NS):
+    pause = t[widest + 1] - t[widest]
+    most = max(LATE_FEW, (_UNSET_PART if before < after and pause > _UNSET_NS else LATE_PART) * len(t))
+    if few > most or pause < max(_FAR_SPANS * span, _FAR_NS):
         return np.empty(0, np.int64)
     return np.arange(before) if before < after else np.arange(widest + 1, len(t))
 
@@ -143,33 +159,47 @@ def _refuse(c: Channel, telemetry: Telemetry, count: int) -> None:
 def _without_second_copies(channels: dict[str, Channel]) -> tuple[dict[str, Channel], list[Finding]]:
     """Samples received twice with stamps a little apart, as over two links: the second of each pair is left out.
 
-    They are told by their values: alike within a tenth of the noise, in most samples of the channel."""
+    They are told by their values, alike within a tenth of the noise or as rounding makes them, in most samples of most channels of one
+    time axis."""
     channels, found = dict(channels), []
-    even: dict[int, bool] = {}  # by the id of an axis of times
+    axes: dict[tuple, list[str]] = {}
+    keys: dict[int, tuple] = {}  # by the id of an axis of times: the channels of a table share theirs
     for name, c in channels.items():
-        if c.kind.behaves != "sensor" or len(c.tai_ns) <= 30 or even.get(id(c.tai_ns)):
+        if c.kind.behaves == "sensor" and len(t := c.tai_ns):
+            if id(t) not in keys:
+                keys[id(t)] = (len(t), int(t[0]), int(t[-1]), int(np.sum(t - t[0])))
+            axes.setdefault(keys[id(t)], []).append(name)
+    for names in axes.values():
+        second = _close_behind(channels[names[0]].tai_ns)
+        if second is None or 2 * sum(_are_copies(channels[n].values, second) for n in names) < len(names):
             continue
-        steps = np.diff(c.tai_ns)
-        even[id(c.tai_ns)] = bool((steps == steps[0]).all())
-        if even[id(c.tai_ns)]:
-            continue
-        beside = np.maximum(np.concatenate((steps[1:], [0])), np.concatenate(([0], steps[:-1])))
-        close = steps < _AT_ONCE * beside
-        if close.mean() < 0.3:
-            continue
-        second = np.concatenate(([False], close))
-        noise = difference_sigma(c.values[~second], 2)
-        pair = np.abs(np.diff(c.values))[close]
-        if noise > 0 and np.mean(pair < _ALIKE * noise) > 0.9:
-            first = int(c.tai_ns[second][0])
-            found.append(
-                Finding(
-                    name,
-                    "duplicate",
-                    int(second.sum()),
-                    first,
-                    "samples follow another at once with the same value, rounded; not used",
-                )
-            )
-            channels[name] = c.where(~second)
+        first = int(channels[names[0]].tai_ns[second][0])
+        detail = "samples follow another at once with the same value, rounded; not used"
+        for n in names:
+            found.append(Finding(n, "duplicate", int(second.sum()), first, detail))
+            channels[n] = channels[n].where(~second)
     return channels, found
+
+
+def _close_behind(t: np.ndarray) -> np.ndarray | None:
+    """Which samples follow another at once, by the pauses beside them; None where few do."""
+    steps = np.diff(t)
+    if len(steps) < 30 or (steps == steps[0]).all():
+        return None
+    beside = np.maximum(np.concatenate((steps[1:], [0])), np.concatenate(([0], steps[:-1])))
+    close = steps < _AT_ONCE * beside
+    return np.concatenate(([False], close)) if close.mean() >= 0.3 else None
+
+
+def _are_copies(values: np.ndarray, second: np.ndarray) -> bool:
+    noise = difference_sigma(values[~second], 2)
+    pair = np.abs(np.diff(values))[second[1:]]
+    fine, coarse = _level(values[~second]), _level(values[second])
+    alike = max(_ALIKE * noise, 0.51 * coarse if coarse > 1.5 * fine else 0.0)
+    return noise > 0 and float(np.mean(pair <= alike)) > 0.9
+
+
+def _level(values: np.ndarray) -> float:
+    """The smallest step between the values that occur."""
+    steps = np.diff(np.unique(values))
+    return float(np.min(steps[steps > 1e-12 * np.max(np.abs(values))], initial=np.inf)) if len(steps) else 0.0

@@ -18,7 +18,7 @@ import scipy
 from ..kit.scatter import MEDIAN_SIZE, difference_sigma
 from ..kit.timeline import NS, segments
 from .channels import AXES, kind_of, to_si
-from .findings import ERROR_TOO_FAST, IMPLAUSIBLE, NOT_UNIT, RATE_SCALE, Finding
+from .findings import ERROR_TOO_FAST, IMPLAUSIBLE, NO_SIGN, NOT_UNIT, RATE_SCALE, Finding
 from .order import in_order
 from .telemetry import BRIDGED, Channel, Telemetry, common_instants
 
@@ -37,6 +37,7 @@ _FAR, _NEAR = (
 )  # ranges of all other samples that a fill value lies away; one of the usual fill values may be nearer
 _PLATEAU = 3  # samples at the end of the range
 _FINE = 10.0  # quantisation steps of a typical change, from which a channel seldom repeats by chance
+_DRIFT = 30  # samples that tell which way a channel drifts
 CHANCE = 1e-6  # significance: an event less probable than this is not due to noise and quantisation
 
 #: Quantities whose noise never repeats bit for bit: a repeated value is stale.
@@ -89,7 +90,7 @@ def screen(telemetry: Telemetry, craft=None) -> Telemetry:
         label_tai_ns=rows[0],
         time_labels={k: v[rows[1]] for k, v in telemetry.time_labels.items()},
         findings=(*telemetry.findings, *findings),
-        doubts=telemetry.doubts + _implausible(channels, craft) + _sun_length(channels),
+        doubts=telemetry.doubts + _implausible(channels, craft) + _sun_length(channels) + _without_sign(channels),
     )
 
 
@@ -117,7 +118,7 @@ def _screened(c: Channel, craft, pauses: dict[int, _Pauses]) -> tuple[Channel, f
     for test in (_without_fills, _without_plateaus, _without_spikes, _without_stuck, _without_repeats):
         c, found = test(c, step)
         findings += found
-    return c, step, [*findings, *_falls(c), *paused]
+    return c, step, [*findings, *_falls(c, step), *paused]
 
 
 # ---- pauses -----------------------------------------------------------------------------------------
@@ -494,7 +495,7 @@ def _repeats_per_move(moves: np.ndarray, step: float) -> float:
     return float(1.5 * np.mean(moves <= width) * step / (2 * width))
 
 
-def _falls(c: Channel) -> list[Finding]:
+def _falls(c: Channel, step: float) -> list[Finding]:
     """Cumulative counts that decrease, and sawteeth: undeclared wraps or resets."""
     c = c.usable
     x, t = c.values, c.tai_ns
@@ -514,10 +515,11 @@ def _falls(c: Channel) -> list[Finding]:
         detail = "decreases although it is cumulative: a wrap (declare it in a channel dictionary) or a reset"
     else:
         noise = sample_noise(c)
-        hit = np.abs(jump) > max(most, 50 * noise)
+        hit = np.abs(jump) > max(most, 50 * noise, 10 * step)
+        small = np.where(hit, 0.0, jump)
         for i in np.flatnonzero(hit):
-            before, after = jump[max(0, i - 5) : i], jump[i + 1 : i + 6]
-            drift = [np.sign(d.mean()) if len(d) and np.abs(d.sum()) > 3 * noise else 0 for d in (before, after)]
+            beside = small[max(0, i - _DRIFT) : i], small[i + 1 : i + 1 + _DRIFT]
+            drift = [np.sign(d.sum()) if np.abs(d.sum()) > 3 * noise else 0 for d in beside]
             hit[i] = drift[0] == drift[1] == -np.sign(jump[i])
         detail = "jumps over its whole range against its own drift: an undeclared wrap?"
     if not hit.any():
@@ -737,6 +739,30 @@ def _sun_length(channels: dict[str, Channel]) -> list[Doubt]:
     length = length[length > 0]
     off = np.abs(length - 1) > _NOT_UNIT
     return [NOT_UNIT(length=float(np.median(length[off])))] if len(length) and np.mean(off) > 0.05 else []
+
+
+def _without_sign(channels: dict[str, Channel]) -> list[Doubt]:
+    """Wheels whose rate falls to zero and rises again at the same pace: a tachometer that counts pulses knows no sense."""
+    names = [n for n, c in channels.items() if c.kind.stem == "wheel_rate" and _turns_at_zero(c.usable)]
+    return [NO_SIGN(channels=names)] if names else []
+
+
+def _turns_at_zero(c: Channel) -> bool:
+    """Whether a rate of one sign has the shape of a V with its point at zero: one line through zero, folded."""
+    x = c.values if np.min(c.values, initial=0) >= 0 else -c.values
+    if len(x) < 3 * _DRIFT or np.min(x) < 0:
+        return False
+    noise, i = sample_noise(c), int(np.argmin(x))
+    t = (c.tai_ns - c.tai_ns[i]) / c.cadence_ns
+    if not _DRIFT <= i < len(x) - _DRIFT or x[i] > 5 * max(noise, float(np.median(np.abs(np.diff(x))))):
+        return False
+    n = min(i, len(x) - 1 - i, 5 * _DRIFT)
+    sides = [slice(i - n, i - 2), slice(i + 3, i + n)]
+    (down, at_down), (up, at_up) = (np.polyfit(t[side], x[side], 1) for side in sides)
+    sigma = max(noise, 1e-9 * float(np.max(x))) * np.sqrt(12 / n**3)  # of a slope
+    return bool(
+        down < -20 * sigma and up > 20 * sigma and abs(up + down) < 0.2 * up and abs(at_down / down - at_up / up) < 3 + 0.1 * n
+    )
 
 
 # ---- summary -----------------------------------------------------------------------

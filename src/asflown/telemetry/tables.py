@@ -237,6 +237,8 @@ def typed(column) -> np.ndarray | list[str]:
         return values if np.ma.is_masked(values) else np.asarray(values)
     if values.dtype.kind == "M":
         return np.ma.filled(values, np.datetime64("NaT"))
+    if values.dtype.kind == "m":
+        return np.ma.filled(values, np.timedelta64("NaT"))
     missing = np.ma.getmaskarray(values)
     plain = np.ma.getdata(values).tolist()
     return ["" if m or v is None else said(v) for v, m in zip(plain, missing.tolist(), strict=True)]

@@ -12,7 +12,7 @@ from ..job import Job
 from ..options import CRAFT, JSON, KEEP_AS, KEEP_IN, PLOT_DIR
 from ..output import say
 from ..verb import Asked, verb
-from .options import AGAINST, ENGINE, FILE, WITHOUT, held, maneuvers_from, past_named, removed_bias
+from .options import AGAINST, COLUMNS, ENGINE, FILE, WITHOUT, held, maneuvers_from, past_named, removed_bias
 
 if TYPE_CHECKING:
     from ...estimate.gates import GatesPatch, GatesResult
@@ -50,6 +50,7 @@ def fit(
     prior_width: float = typer.Option(0.5, "--prior-width", help="Its width, in parts of each sigma."),
     against: str = AGAINST,
     without: str = WITHOUT,
+    columns: Path = COLUMNS,
     patch: str = PATCH,
     removed: str = REMOVED,
     bootstrap: int = typer.Option(0, "--bootstrap", min=0, max=100_000, help="Parametric refits."),
@@ -76,7 +77,7 @@ def fit(
     if store is not None:
         job.craft_named(craft)  # whose entry it will be: before the work
     compared = None
-    burns = maneuvers_from(file, engine, without)
+    burns = maneuvers_from(file, engine, without, columns)
     if patch is not None:
         compared = _patched(burns, patch, removed)
         burns = compared.maneuvers

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import typer
 
-FILE = typer.Argument(help="Maneuvers: CSV (plain or gzip), Parquet or TOML (docs/maneuvers.md).")
+FILE = typer.Argument(help="Maneuvers: CSV (plain or gzip), Parquet, Excel or TOML (docs/maneuvers.md).")
 ENGINE = typer.Option(None, "--engine", help="Which engine's, where the file holds several.")
 WITHOUT = typer.Option(None, "--without", help='Maneuvers left out, as in "OTM-264,OTM-265".')
+COLUMNS = typer.Option(None, "--columns", help="Dictionary of the table's columns (TOML), where it has other ones.")
 AGAINST = typer.Option(
     None,
     "--against",
@@ -16,11 +17,11 @@ AGAINST = typer.Option(
 )
 
 
-def maneuvers_from(file: Path, engine: str | None, without: str | None = None):
+def maneuvers_from(file: Path, engine: str | None, without: str | None = None, columns: Path | None = None):
     """The maneuvers of one engine, without some."""
     from ...maneuvers.table import load_maneuvers
 
-    burns = load_maneuvers(file).of(engine)
+    burns = load_maneuvers(file, columns=columns).of(engine)
     return burns if without is None else burns.without([w.strip() for w in without.split(",")], "left out by --without")
 
 

@@ -9,7 +9,7 @@ import typer
 from ..job import Job
 from ..options import JSON, PLOT_DIR
 from ..verb import verb
-from .options import AGAINST, ENGINE, FILE, WITHOUT, maneuvers_from, past_named
+from .options import AGAINST, COLUMNS, ENGINE, FILE, WITHOUT, maneuvers_from, past_named
 
 
 @verb
@@ -21,6 +21,7 @@ def watch(
     against: str = AGAINST,
     false_alarm: float = typer.Option(0.05, "--false-alarm", help="Share of watches as long that raise a false alarm."),
     without: str = WITHOUT,
+    columns: Path = COLUMNS,
     plot_dir: Path = PLOT_DIR,
     json: bool = JSON,
 ) -> None:
@@ -30,7 +31,7 @@ def watch(
     from ...plots.gates_watch import watch_figures
 
     job = Job(context)
-    burns = maneuvers_from(file, engine, without)
+    burns = maneuvers_from(file, engine, without, columns)
     past = past_named(against, burns.engine_name)
     result = gates_watch(burns, first=first, against=past, false_alarm=false_alarm)
     job.finish(result, inputs=inputs_of(against), figures=watch_figures, failed=result.verdict == "alarm")

@@ -139,7 +139,13 @@ def _actuators(subject: Subject):
     if tlm.members("wheel_rate") or tlm.has_axes("wheel_momentum") or tlm.has_axes("control_torque"):
         return actuators(subject)
     with needed():
-        return actuators(subject)
+        found = actuators(subject)
+    if not found[0] and not found[1]:
+        raise CannotFuse(
+            f"{subject.craft.craft.name} has no wheels, and no control torque is telemetered: nothing to fuse with the body rates",
+            remedy="Use --method momentum.",
+        )
+    return found
 
 
 def _loop(subject: Subject, axes, loop: str | None, *, pushed: bool) -> tuple[str, Doubt | None]:

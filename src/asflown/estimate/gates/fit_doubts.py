@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -62,6 +63,11 @@ BIASES_UNSUPPORTED = Kind(
     "biases of {quantity} are not supported by the data (AICc {aicc_with:.1f} with them, {aicc_without:.1f} without)",
     "Compare with --model zero-mean.",
 )  # fmt: skip
+VARIANCES = Kind(
+    "gates.variances-as-sigmas", Severity.SUSPECT,
+    "the errors are e^{ratio:.1f} times likelier if the orbit determination's sigmas are variances, in {unit} squared: are they?",
+    "Give standard deviations: the square roots.",
+)  # fmt: skip
 EXPONENT_WEIGHTS = Kind(
     "gates.exponent-weights", Severity.CAUTION,
     "densities to the power of a weight are no likelihood: there are no intervals, and the value has no meaning (as printed, Wagner 2014 Appendix B)",
@@ -99,6 +105,8 @@ def doubts_of(
             yield from _of_sigmas(part, likelihood)
             yield _of_biases(part, model)
     yield from course_doubts(m, parts)
+    if likelihood == "additive":
+        yield _of_variances([p for p in parts if p.known])
     yield from _of_likelihood(m, likelihood, parts)
     if prior is not None:
         yield from _of_prior(prior.name or "an earlier model", parts)
@@ -133,6 +141,24 @@ def _of_biases(part: Part, model: str) -> Doubt | None:
     if biased is None or flat is None or flat >= biased - 2:
         return None
     return BIASES_UNSUPPORTED(quantity=part.quantity, aicc_with=biased, aicc_without=flat)
+
+
+#: Units that variances may be squares of. [m/s]
+_SQUARED = {"mm/s": 1e-3, "m/s": 1.0}
+#: Log likelihood ratio from which they are taken for it; less often than once in 20 sets of true sigmas, by Markov's inequality.
+_LIKELIER = float(np.log(20 * len(_SQUARED)))
+
+
+def _of_variances(parts: list[Part]) -> Doubt | None:
+    """Whether the burns' errors scatter as if the sigmas of the orbit determination were variances."""
+    gain = dict.fromkeys(_SQUARED, 0.0)
+    for part in parts:
+        told = part.problem.log_likelihood(part.point)
+        for unit, size in _SQUARED.items():
+            other = replace(part.problem, d=np.sqrt(part.problem.d) * size / part.problem.size)
+            gain[unit] += other.log_likelihood(other.minimum()) - told
+    unit = max(gain, key=lambda u: gain[u])
+    return VARIANCES(ratio=gain[unit], unit=unit) if parts and gain[unit] > _LIKELIER else None
 
 
 def _of_likelihood(m: Maneuvers, likelihood: str, parts: list[Part]) -> Iterator[Doubt]:

@@ -114,11 +114,15 @@ def check_wheels(subject: Subject) -> None:
     """Raises BadInput for a craft that has no wheels, and whose telemetry has no momentum either."""
     name = subject.craft.craft.name
     if not subject.craft.craft.wheels and not subject.telemetry.has_axes("wheel_momentum"):
-        raise BadInput(
-            f"{name} has no wheels, and it is the momentum that wheels hold which tells the inertia",
-            file=subject.telemetry.source or None,
-            remedy="Describe them as [[wheels]] in the craft file, or add wheel_momentum_x, _y, _z.",
-        )
+        raise no_wheels(name, subject.telemetry.source or None)
+
+
+def no_wheels(name: str, file: str | None = None) -> BadInput:
+    return BadInput(
+        f"{name} has no wheels, and it is the momentum that wheels hold which tells the inertia",
+        file=file,
+        remedy="Describe them as [[wheels]] in the craft file, or add wheel_momentum_x, _y, _z.",
+    )
 
 
 def _check_motion(tlm: Telemetry, rates: RateSamples, attitude: AttitudeSamples) -> None:

@@ -34,7 +34,7 @@ from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
 from ..subject import subject_of
 from .excitation import excitation, named, normal_matrix
-from .gather import check_wheels
+from .gather import check_wheels, no_wheels
 from .prior import PRODUCT_SHARE, prior_sigma
 from .tensor import whole_motion_of
 
@@ -319,6 +319,8 @@ class _Flown:
 def _begun(craft: Craft, telemetry: Telemetry | None, date: str | None) -> tuple[CraftAt, _Flown, Doubts]:
     """The craft on the telemetry's date, or on the one given; what has been flown, and doubts of both."""
     if telemetry is None:
+        if not craft.wheels:
+            raise no_wheels(craft.name)
         now = craft.at(None if date is None else int(utc_to_tai_ns(date)))
         return now, _Flown(), now.doubts
     subject = subject_of(telemetry, craft)

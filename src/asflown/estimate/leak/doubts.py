@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 MISFIT = 7.0
 #: A thruster is part of a mixture from this share of its largest on.
 _PART = 0.05
+#: A worn thruster loses no more than this share of a pulse; assumed.
+_MOST_LOST = 0.5
 #: Degrees of freedom below which the noise is little known; correlated readings that count as one, above which it is doubted.
 _FEW_DEGREES, _CORRELATED = 120, 3.0
 
@@ -96,6 +98,12 @@ LOSS_TOO_LARGE = Kind(
     "saturates), or on-times are under wrong names",
     "Check the wheels' rate limits and the names of the on-time channels.",
 )  # fmt: skip
+LOSS_LARGE = Kind(
+    "leak.loss-large", Severity.SUSPECT,
+    "a loss of {loss_percent:.0f} % is that of a thruster that hardly fires at all: it is closed, or its on-times are under a wrong name, "
+    "those of another are missing (a column of zeros), or inertia or wheels are in another unit",
+    "Check the names and units of on-times and wheel rates before the thruster.",
+)  # fmt: skip
 SMALL_TORQUE = Kind(
     "leak.small-torque", Severity.CAUTION,
     "an external torque (sunlight, thin atmosphere) that has changed can mimic a leak this small", "Give its size with --torque-sigma.",
@@ -163,5 +171,7 @@ def branch_doubt(telemetry: Telemetry, craft: Craft) -> Doubt | None:
 
 
 def loss_doubt(loss: float, sigma: float) -> Doubt | None:
-    """A pulse cannot give less than nothing."""
-    return LOSS_TOO_LARGE(loss_percent=100 * loss) if loss - 2 * sigma > 1 else None
+    """A pulse cannot give less than nothing, and seldom loses more than half."""
+    if loss - 2 * sigma > 1:
+        return LOSS_TOO_LARGE(loss_percent=100 * loss)
+    return LOSS_LARGE(loss_percent=100 * loss) if loss - 2 * sigma > _MOST_LOST else None

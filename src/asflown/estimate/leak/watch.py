@@ -20,6 +20,8 @@ from ...kit.result import noted, recorded
 from ...kit.timeline import NS
 from ..firing import PULSES, center_doubts, gained_idle, other_branch, pulse_Nms, uncounted
 from ..subject import Subject, stopped, subject_of
+from .answered import answer_doubt
+from .as_ordered import as_ordered
 from .diagnosis import Diagnosis, diagnosed
 from .doubts import PAPERS_MONITOR, SHORT_RECORD, branch_doubt, noise_doubts, thrust_doubt
 from .firing import geometry_of
@@ -198,7 +200,9 @@ class LeakWatch:
             noise_Nms=monitor.noise.sigma,
             monitor=papers,
             known=self.known,
-            doubts=self._doubts(view, monitor.noise, short=smallest is None) + of_change,
+            doubts=self._doubts(view, monitor.noise, short=smallest is None)
+            + of_change
+            + Doubts(as_ordered(steps, self.geometry, found)),
             settings={
                 "thrust_N": view.thrust_N,
                 "center_of_mass_m": self.craft.stated_center,
@@ -251,7 +255,7 @@ class LeakWatch:
         found, doubts = diagnosed(
             monitor.best, view.time_s, self.geometry, self.known, view.thrust_N, self._pulse_Nms(view)
         )
-        return found, Doubts([*of_record, *doubts])
+        return found, Doubts([*of_record, answer_doubt(view.subject, found), *doubts])
 
     def _pulse_Nms(self, view: _View) -> float:
         date_ns = view.subject.telemetry.date_ns

@@ -21,8 +21,17 @@ COMMANDED_ONLY = Kind(
 )  # fmt: skip
 
 
+NO_ACTUATORS = Kind(
+    "subject.no-actuators", Severity.CAUTION,
+    "{craft} has no wheels, and no control torque is telemetered: the torque is all that acts on the body, torque rods and thrusters "
+    "included", "Add control_torque_x, _y and _z where something commands one.",
+)  # fmt: skip
+
+
 def actuators(subject: Subject):
-    """What holds momentum: [(channel, momentum per unit)], or the control torque channels, and doubts."""
+    """What holds momentum: [(channel, momentum per unit)], or the control torque channels, and doubts.
+
+    Neither for a craft without wheels, whose body alone holds momentum."""
     tlm = subject.telemetry
     if tlm.members("wheel_rate"):
         pairs = subject.wheels()
@@ -33,10 +42,13 @@ def actuators(subject: Subject):
     if tlm.has_axes("control_torque"):
         return [], [tlm.channel(f"control_torque_{a}") for a in AXES], [COMMANDED_ONLY()]
     subject.wheels()  # names what is missing
+    if not subject.craft.wheels and tlm.has_axes("body_rate") and subject.inertia_kgm2 is not None:
+        return [], [], [NO_ACTUATORS(craft=subject.craft.craft.name)]
     raise BadInput(
         "neither wheel rates, wheel momentum nor control torque are in the telemetry",
         file=tlm.source or None,
-        remedy="The momentum method needs wheel_rate_<WHEEL>, wheel_momentum_x|y|z or control_torque_x|y|z.",
+        remedy="The momentum method needs wheel_rate_<WHEEL>, wheel_momentum_x|y|z or control_torque_x|y|z; of a craft without wheels, "
+        "body rates and its inertia.",
     )
 
 

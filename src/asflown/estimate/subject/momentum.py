@@ -97,7 +97,7 @@ def samples_of(subject: Subject) -> Samples:
     channels = [*(c for c, _ in stored), *rates]
     tai_ns, values = together(tlm, [*(c.name for c in channels), *quaternion])
     splined_s = 0.0
-    if len(tai_ns) > 0.5 * len(stored[0][0].usable.tai_ns):
+    if len(tai_ns) > 0.5 * len(channels[0].usable.tai_ns):
         attitude = rotation(values[:, len(channels) :]) if quaternion else None
     else:
         doubts = [*doubts, SPLINED()]
@@ -110,7 +110,7 @@ def samples_of(subject: Subject) -> Samples:
             f"{len(tai_ns)} instants at which all channels are known are too few",
             remedy=f"At least {FEWEST} are needed: take a longer record.",
         )
-    each = values[:, : len(stored), None] * np.array([d for _, d in stored])
+    each = values[:, : len(stored), None] * np.array([d for _, d in stored]).reshape(-1, 3)
     w = values[:, len(stored) : len(channels)] if rates else None
     body = np.zeros((len(tai_ns), 3))
     if w is not None and I_B is not None:

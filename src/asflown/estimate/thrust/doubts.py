@@ -10,7 +10,7 @@ from ...craft.model import STALE_NS
 from ...kit.doubts import Doubt, Kind, Severity
 from ...kit.timeline import NS, utc_label
 from ...telemetry.channels import AXES
-from ..firing import Source
+from ..firing import Source, thrust_slip
 from ..subject import stopped
 from .fit import CENTER, FALL_TIME
 
@@ -81,22 +81,6 @@ RECORDS_APART = Kind(
 OLD_PREDICTION = Kind(
     "thrust.old-prediction", Severity.CAUTION, "the predicted thrust is the last one known, of {date}: it has fallen since",
 )  # fmt: skip
-#: What a wrong unit makes of the thrust: the factor, and the units.
-_SLIPS = {
-    1e-3: "on-times in ms labelled s, or thrusters' places in mm labelled m",
-    1e3: "on-times in s labelled ms",
-    1 / 60: "on-times in s labelled min",
-    60.0: "on-times in min labelled s",
-    0.3048: "thrusters' places in ft labelled m",
-    0.0254: "thrusters' places in inches labelled m",
-    60 / (2 * np.pi): "wheel rates in rpm labelled rad/s",
-    2 * np.pi / 60: "wheel rates in rad/s labelled rpm",
-    1 / (2 * np.pi): "wheel rates in rev/s labelled rad/s",
-    180 / np.pi: "wheel rates in deg/s labelled rad/s",
-    4.448: "a thrust in lbf labelled N in the craft file",
-}
-#: A slip is named where the ratio is that close to its factor.
-_CLOSE = 1.25
 #: A tank that blows down or is recharged does not bring the thrust further from all that the craft file knows; assumed.
 _BEYOND = 2.0
 #: Sigmas of prior and fit together beyond which what is taken beforehand is contradicted: a prior's sigma is itself only assumed.
@@ -219,7 +203,7 @@ def _off_prediction(mean_N: float, sigma_N: float, predicted_N: float) -> Doubt 
         return None
     told = {"percent": 100 * off / predicted_N, "predicted_N": predicted_N, "share_percent": 100 * _PREDICTED_SHARE}
     if abs(off) > _NO_BRANCH * predicted_N:
-        return FAR_FROM_PREDICTION(**told, guess=_guess(mean_N / predicted_N))
+        return FAR_FROM_PREDICTION(**told, guess=thrust_slip(mean_N / predicted_N))
     return OFF_PREDICTION(**told)
 
 
@@ -230,10 +214,4 @@ def _beyond_the_file(craft: Craft, mean_N: float, sigma_N: float) -> Doubt | Non
     ratio = mean_N / near
     if 1 / _BEYOND <= ratio <= _BEYOND or sigma_N > abs(mean_N - near):
         return None
-    return BEYOND_THE_FILE(ratio=ratio, known_N=near, guess=_guess(ratio))
-
-
-def _guess(ratio: float) -> str:
-    """': are the on-times in ms labelled s?' where a wrong unit makes such a ratio, else ''."""
-    slips = [what for factor, what in _SLIPS.items() if 1 / _CLOSE < ratio / factor < _CLOSE]
-    return f": {' or '.join(slips)}?" if slips else ""
+    return BEYOND_THE_FILE(ratio=ratio, known_N=near, guess=thrust_slip(ratio))

@@ -180,6 +180,11 @@ def inertia_variance(I_B: np.ndarray, share: float, rate: np.ndarray, accelerati
 def splined_momentum(subject: Subject) -> tuple[Grid, np.ndarray]:
     """Wheel momentum in body axes, every rate splined to 1 s (cover paper, eq 7 and section III-A)."""
     wheels = subject.wheels()
+    if not wheels:
+        raise BadInput(
+            f"{subject.craft.craft.name} has no wheels, and the printed method takes their momentum alone",
+            remedy="Use --variant corrected.",
+        )
     grid = grid_for([c for c, _ in wheels], step_s=1.0)
     rates = np.stack([splined(c, grid) for c, _ in wheels], axis=1)
     axes, spin = axes_and_inertias(wheels)
