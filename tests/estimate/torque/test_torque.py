@@ -12,7 +12,7 @@ from asflown import fly, load_craft, load_telemetry
 from asflown.campaigns.truth import against_truth
 from asflown.estimate.subject import PER_SPIN_INERTIA
 from asflown.estimate.subject.grid import GAPS_NULL
-from asflown.estimate.torque import consistency, momentum, reconstruct
+from asflown.estimate.torque import momentum, reconstruct
 from asflown.estimate.torque.compare import best_lag, torque_comparison
 from asflown.kit.doubts import Severity
 from asflown.kit.errors import BadInput
@@ -222,18 +222,13 @@ def doubts(tlm, craft=CASSINI, **how):
     return asflown.torque(tlm, craft, axis="y", **how).doubts
 
 
-def test_a_flipped_attitude_error_raises_a_doubt_about_a_sign():
-    assert doubts(scaled(LINEAR[1][0], "attitude_error", -1)).has(consistency.OPPOSITE)
-    assert not doubts(LINEAR[1][0]).has(consistency.OPPOSITE)
-
-
-@pytest.mark.parametrize(
-    ("stem", "factor", "words"),
-    [("wheel_rate", 60 / (2 * np.pi), "rpm labelled rad/s"), ("attitude_error", 1e3, "mrad labelled rad")],
-)
-def test_a_wrong_unit_raises_a_doubt(stem, factor, words):
-    (doubt,) = doubts(scaled(LINEAR[1][0], stem, factor)).of(consistency.OTHER_SCALE)
-    assert words in doubt.about["guess"]
+def test_every_method_says_where_channels_contradict_each_other():
+    """The shared check (tests/estimate/redundancy) reaches every method and variant."""
+    flipped = scaled(LINEAR[1][0], "attitude_error", -1)
+    for how in ({}, {"method": "momentum"}, {"method": "transfer"}, {"method": "momentum", "variant": "printed"}):
+        found = [d.kind.id for d in doubts(flipped, **how) if d.kind.id.startswith("redundancy.")]
+        assert found == ["redundancy.ratio"], how
+    assert not [d for d in doubts(LINEAR[1][0]) if d.kind.id.startswith("redundancy.")]
 
 
 def test_a_wheel_the_craft_does_not_have_is_refused():

@@ -31,6 +31,7 @@ from ...kit.timeline import NS
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
 from ..environment import known_terms
+from ..redundancy import redundancy
 from ..subject import (
     FEWEST,
     GYRO_BIAS,
@@ -194,7 +195,8 @@ def external_torque(
             result = _drift(subject, turn_rad_s, taken) if method == "drift" else _momentum(subject, frame, taken)
     except BadInput as why:
         raise why.within(telemetry.source) from why.__cause__
-    found = [*subject.doubts, *result.doubts, PER_SPIN_INERTIA(what="the torque is") if subject.relative else None]
+    relative = PER_SPIN_INERTIA(what="the torque is") if subject.relative else None
+    found = [*subject.doubts, *result.doubts, relative, *redundancy(subject)]
     return replace(result, doubts=Doubts(found))
 
 

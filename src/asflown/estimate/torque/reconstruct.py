@@ -10,10 +10,10 @@ from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput, check_choice
 from ...kit.result import recorded
 from ...telemetry.channels import AXES
+from ..redundancy import redundancy
 from ..subject import PER_SPIN_INERTIA, Subject, subject_of
 from .answer import Answer, Method
 from .choice import method_called
-from .consistency import consistency
 from .known import check_known, without_known
 from .result import TorqueResult
 from .rods import rods_doubt
@@ -166,7 +166,7 @@ def _doubts(subject: Subject, answer: Answer, *, relative: bool) -> Doubts:
         found.append(THRUSTERS_FIRE(thrusters=subject.firing))
     if relative:
         found.append(PER_SPIN_INERTIA(what="torque and momentum are"))
-    return Doubts([*found, rods_doubt(subject.telemetry, answer.sigma_Nm), *consistency(subject, answer)])
+    return Doubts([*found, rods_doubt(subject.telemetry, answer.sigma_Nm), *redundancy(subject)])
 
 
 def _nothing_changes(telemetry: Telemetry) -> bool:
