@@ -44,6 +44,7 @@ from .doubts import (
     span_doubts,
 )
 from .drag import DragGiven, flyby_drag
+from .expected import peak_doubts
 from .gas_torque import estimated_torque, gas_torque, without_rates
 from .height import jets_peaks, noticed_in, peak_of, published_ratios
 from .parts import MomentumHeld
@@ -240,6 +241,9 @@ def _peak_doubts(subject: Subject, asked: Asked, found: _Found) -> list[Doubt]:
         doubts += gravity_doubts(found.peak, gas.time_s, gas.bound_Nm)
     elif gas.gravity_Nm is not None and subject.slewing:
         doubts.append(GRAVITY_FIXED_ATTITUDE())
+    if not curve.drag.signed or found.peak.density_kgm3 > 0:
+        ratios = published_ratios(found.peak, found.passage.flyby)
+        doubts += peak_doubts(found.peak, found.passage.flyby, ratios, own_sources=asked.sources is not None)
     if asked.cusps and found.atmosphere is None:
         doubts += cusp_doubts(found.peak, found.drawn_peaks)
     return doubts

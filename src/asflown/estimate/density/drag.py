@@ -18,6 +18,7 @@ from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput, check_choice
 from ...kit.quantities import si_factor
 from ...telemetry.channels import AXES, split_header
+from .expected import size_doubts
 
 if TYPE_CHECKING:
     from ...craft.model import Aerodynamics, Craft
@@ -169,6 +170,7 @@ def _constant(air: Aerodynamics, flyby: Flyby, given: DragGiven) -> DragAlong:
     if air.flyby and air.flyby != flyby.name and None in (given.area_m2, given.arm_m):
         scale_sigma = None
         doubts.append(SCALE_UNKNOWN(known_at=air.flyby, flyby=flyby.name))
+    doubts += size_doubts(air, area, arm)
     t, speed = _speeds(flyby)
     doubts.append(CONSTANT_DRAG(what="speed, area and arm" if len(t) == 1 else "area and arm"))
     j = AXES.index(given.axis or air.axis)
@@ -216,7 +218,7 @@ def _from_table(air: Aerodynamics, flyby: Flyby, given: DragGiven) -> DragAlong:
         "drag_table": str(path), "drag_coefficient": air.drag_coefficient, "speed_m_s": [speed.min(), speed.max()],
         "projected_area_m2": [area.min(), area.max()], "table_from_s": t[0], "table_to_s": t[-1],
     }  # fmt: skip
-    doubts += _table_doubts(t, speed, k, flyby)
+    doubts += [*size_doubts(air, area, np.linalg.norm(arm, axis=1)), *_table_doubts(t, speed, k, flyby)]
     return DragAlong(t, k, axes, True, scale_sigma, settings, Doubts(doubts))
 
 

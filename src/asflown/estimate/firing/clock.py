@@ -92,7 +92,12 @@ def check_counts(tlm: Telemetry, names: Sequence[str]) -> None:
 
 
 def check_pulses(
-    used: np.ndarray, begun: np.ndarray, interval_s: np.ndarray, step_s: float, thrusters: Sequence[Thruster], tlm: Telemetry
+    used: np.ndarray,
+    begun: np.ndarray,
+    interval_s: np.ndarray,
+    step_s: float,
+    thrusters: Sequence[Thruster],
+    tlm: Telemetry,
 ) -> list[Doubt]:
     """What pulse counts say against on-times, thruster by thruster; rises (M, j) of both within intervals (M,).
 

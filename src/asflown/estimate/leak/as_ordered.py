@@ -46,7 +46,11 @@ def as_ordered(steps: Steps, geometry: Geometry, found: Diagnosis) -> list[Doubt
     ordered, doubts = steps.ordered.copy(), []
     if not ordered.any():
         return []
-    if found.kind == "leak" and found.thruster is not None and not ordered[:, geometry.names.index(found.thruster)].any():
+    if (
+        found.kind == "leak"
+        and found.thruster is not None
+        and not ordered[:, geometry.names.index(found.thruster)].any()
+    ):
         doubts.append(NEVER_ORDERED(thruster=found.thruster))
     if found.kind == "leak":
         doubts += _while_firing(steps, found)

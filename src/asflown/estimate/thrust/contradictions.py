@@ -21,14 +21,14 @@ _IDLE = 0.05
 
 def check_names(f: Firings, priors: Priors) -> None:
     """Raises BadInput where the momentum contradicts the thrusters named, and exchanging the names of one or two pairs would
-    remove the contradiction."""
+    remove the contradiction, or turning the senses of all wheels."""
     center = f.subject.craft.craft.center_of_mass or priors.center_m
     Q = moment_matrix([t.position for t in f.thrusters], [t.direction for t in f.thrusters], center)
     known = ~f.at_limit[1:]
     V, on = balance(f)[known], (f.known.on_time_s[1:] - f.known.on_time_s[0])[known]
 
-    def unexplained(order) -> float:
-        u, v = (on[:, order] @ Q.T).ravel(), V.ravel()
+    def unexplained(order, sense: float = 1.0) -> float:
+        u, v = sense * (on[:, order] @ Q.T).ravel(), V.ravel()
         F = max(float(u @ v) / max(float(u @ u), 1e-300), 0.0)
         return float(np.linalg.norm(v - F * u)) / max(float(np.linalg.norm(v)), 1e-300)
 
@@ -36,6 +36,14 @@ def check_names(f: Firings, priors: Priors) -> None:
     own = unexplained(order)
     if own < _UNEXPLAINED:
         return
+    reverse = unexplained(order, -1.0)
+    if reverse < _BETTER * own:
+        raise BadInput(
+            f"momentum and firings contradict each other ({100 * own:.0f} % unexplained): a negative thrust leaves {100 * reverse:.0f} %",
+            file=f.telemetry.source or None,
+            channel="wheel_rate",
+            remedy="Check the senses of all wheels (axes, signs of their rates), and the thrusters' directions: of the force on the craft.",
+        )
     single = list(combinations(order, 2))
     double = [(a, b) for a, b in combinations(single, 2) if not set(a) & set(b)]
     for exchanges in ([(p,) for p in single], double):

@@ -125,10 +125,7 @@ UNLIKE_OTHERS = Kind(
 def joint_doubts(fit: Fit, priors: Priors, records: list[Firings]) -> Iterable[Doubt]:
     """Of the joint method."""
     mean, sigma = fit.mean()
-    if sigma > abs(mean):
-        yield NOTHING_KNOWN(sigma_N=sigma)
-    elif sigma > _HARDLY * abs(mean):
-        yield HARDLY_KNOWN(percent=100 * sigma / abs(mean))
+    yield from _how_well(mean, sigma)
     correlation = fit.correlation(fit.mean_weights, FALL_TIME)
     if abs(correlation) > _TIED:
         fall_sigma_s = fit.sigma(FALL_TIME)
@@ -149,6 +146,13 @@ def joint_doubts(fit: Fit, priors: Priors, records: list[Firings]) -> Iterable[D
         yield MISFIT(ratio=float(np.sqrt(fit.misfit)))
         for f in records:
             yield from stopped(f.subject)
+
+
+def _how_well(mean_N: float, sigma_N: float) -> Iterable[Doubt]:
+    if sigma_N > abs(mean_N):
+        yield NOTHING_KNOWN(sigma_N=sigma_N)
+    elif sigma_N > _HARDLY * abs(mean_N):
+        yield HARDLY_KNOWN(percent=100 * sigma_N / abs(mean_N))
 
 
 def _against_priors(fit: Fit, priors: Priors) -> Iterable[Doubt]:

@@ -106,7 +106,9 @@ def _check_thrust(done: ThrustResult) -> None:
     mean, sigma = done.mean_thrust_N, done.mean_thrust_sigma_N or 0.0
     if np.isfinite(mean) and np.isfinite(sigma) and mean > -2 * sigma:
         return
-    came = f"comes out negative ({mean:.3g} N)" if np.isfinite(mean) and mean < 0 else "is not determined by this record"
+    came = (
+        f"comes out negative ({mean:.3g} N)" if np.isfinite(mean) and mean < 0 else "is not determined by this record"
+    )
     raise BadInput(
         f"the mean thrust {came}: momentum and firings contradict each other",
         remedy="Check the sense of the wheels' rates and axes, the thrusters' directions, and names and units of the on-times.",
