@@ -255,9 +255,8 @@ def _wheel_rows(about: Reference, states: States, frame: str, seen: np.ndarray) 
     w, alpha, Rk = motion.omega_B[k], motion.alpha_B[k], R[k]
     L = np.einsum("nji,nj->ni", Rk, layout.momenta(beta)[m.arc] + added[k])  # of everything, body axes
     predicted = L - w @ I_B
-    held = np.zeros((len(k), 3, layout.swings))
-    for j, swing in enumerate(about.record.swings):
-        held[:, :, j] = swing.momentum(motion.time_s, motion.alpha_B)[k]
+    swings = [swing.columns(motion.time_s, motion.alpha_B)[k] for swing in about.record.swings]
+    held = np.concatenate(swings, axis=2) if swings else np.zeros((len(k), 3, 0))
     predicted = predicted - held @ beta[layout.amplitudes]
     H = np.zeros((len(k), states.size))
     H[:, :3] = np.cross(d, L)
