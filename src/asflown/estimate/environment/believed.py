@@ -26,7 +26,7 @@ from ...kit.timeline import NS
 from ...telemetry.channels import AXES
 from ..subject import OF_THE_SUN, sky_doubts
 from .orbits import carried, gravity_words, longest_gap, orbit_in, refuse_contradictions
-from .sky import Place, Seen, attitude_at, field_at_craft, rods_at, sun_at_craft
+from .sky import Place, Seen, attitude_at, believed_sun, field_at_craft, rods_at, sun_at_craft
 from .term import Term, levers
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def environment_of(
     field, no_field = field_at_craft(tlm, place) if {"dipole", "rods"} & set(which) else (None, "")
     sun, no_sun, of_sun = sun_at_craft(tlm, place) if "sunlight" in which else (None, "", [])
     if "sunlight" in which:
-        of_sun = [*of_sun, *sky_doubts(tlm, craft).of(*OF_THE_SUN)]
+        of_sun = believed_sun(sun, of_sun, sky_doubts(tlm, craft).of(*OF_THE_SUN))
     makers = {
         "gravity-gradient": partial(_gravity, subject, place, why),
         "sunlight": partial(_sunlight, craft, sun, no_sun),
