@@ -25,7 +25,7 @@ from ...kit.errors import BadInput, check_choice, some_of
 from ...kit.timeline import NS
 from ...telemetry.channels import AXES
 from ..subject import OF_THE_SUN, sky_doubts
-from .orbits import carried, gravity_words, longest_gap, orbit_in, refuse_contradictions
+from .orbits import carried, flown_through, gravity_words, longest_gap, orbit_in, refuse_contradictions
 from .sky import Place, Seen, attitude_at, believed_sun, field_at_craft, rods_at, sun_at_craft
 from .term import Term, levers
 
@@ -174,6 +174,8 @@ def _place(subject: Subject, tai_ns: np.ndarray) -> tuple[Place, Doubts, str]:
     refuse_contradictions(tlm, doubts)
     position, velocity, why = None, None, "orbit_position_x, _y, _z, or [orbit] in the craft file"
     if orbit is not None:
+        orbit, gaps = flown_through(orbit, body)
+        doubts = Doubts([*doubts, gaps])
         gap = longest_gap(orbit, float(t[0]), float(t[-1]))
         if gap <= _GAP * 2 * np.pi * np.sqrt(orbit.nearest_m**3 / orbit.mu):
             at = np.clip(t, orbit.time_s[0], orbit.time_s[-1])
