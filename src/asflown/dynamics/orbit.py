@@ -52,6 +52,8 @@ BODIES = (
 #: An orbit's acceleration is compared over steps of at most this. [s]
 _STEP_S = 600.0
 _COMPARED = 60
+#: A gap in the positions: so many usual steps, and so long at least. [s]
+_GAP, _GAP_S = 3.0, 30.0
 #: Noise of the positions may hide this share of the acceleration; free fall holds to this share of it (the Earth's flattening
 #: makes a tenth of it); a body is the one whose parameter is this near.
 TOLD, FREE, NEAR = 0.02, 0.02, 0.03
@@ -157,6 +159,43 @@ _READINGS = (
     ("in Earth-fixed axes and in kilometres, labelled metres", 1e3, True),
     ("in Earth-fixed axes and in metres, labelled kilometres", 1e-3, True),
 )
+
+
+def bridged(orbit: Orbit, longest_s: float, j2: float = J2_EARTH) -> tuple[Orbit, list[float]]:
+    """An orbit whose gaps are flown, and their lengths [s].
+
+    Between the last position before a gap and the first after it the craft falls freely: the velocity at its start is the one that
+    reaches its end.  Gaps are steps of more than ``_GAP`` usual ones and ``_GAP_S``; those longer than ``longest_s`` stay."""
+    t, r = orbit.time_s, orbit.position_N
+    step = np.diff(t)
+    gaps = np.flatnonzero((step > max(_GAP * float(np.median(step)), _GAP_S)) & (step <= longest_s))
+    times, places, lengths = [t], [r], []
+    for k in gaps:
+        inside = np.linspace(0.0, step[k], int(np.ceil(step[k] / _GAP_S)) + 1)
+        flown_ = _falling(r[k], r[k + 1], inside, orbit.mu, j2)
+        if flown_ is not None:
+            times.append(t[k] + inside[1:-1])
+            places.append(flown_[1:-1])
+            lengths.append(float(step[k]))
+    order = np.argsort(np.concatenate(times))
+    return Orbit(np.concatenate(times)[order], np.concatenate(places)[order], orbit.mu), lengths
+
+
+def _falling(first: np.ndarray, last: np.ndarray, t: np.ndarray, mu: float, j2: float) -> np.ndarray | None:
+    """Free fall from one place to another, the short way round: positions at instants t (N,) from the start; None where it is not found."""
+    angle = float(np.arctan2(np.linalg.norm(np.cross(first, last)), first @ last))
+    if not 1e-6 < angle < 0.9 * np.pi:
+        return None
+    across = last - first * (first @ last) / (first @ first)
+    v = across / np.linalg.norm(across) * np.linalg.norm(first) * angle / t[-1]
+    for _ in range(8):
+        r = propagate(first, v, t, mu, j2)[0]
+        off = last - r[-1]
+        if float(np.linalg.norm(off)) < 1.0:
+            return r
+        nudged = [propagate(first, v + e, t[[0, -1]], mu, j2)[0][-1] - r[-1] for e in np.eye(3)]
+        v = v + np.linalg.solve(np.array(nudged).T, off)
+    return None
 
 
 def check_above_earth(position_N: np.ndarray) -> None:

@@ -11,6 +11,7 @@ from scipy.integrate import quad
 
 from asflown.craft.load import load_craft
 from asflown.estimate.firing.priors import CENTER_NOT_KNOWN
+from asflown.estimate.leak.diagnosis import _onset_interval
 from asflown.estimate.leak.doubts import (
     NO_SINGLE_THRUSTER,
     SEVERAL_THRUSTERS,
@@ -360,3 +361,14 @@ def test_verb_follows_to_the_end_of_a_quiet_file(leak_of_z3, tmp_path):
     assert "no data has been written" in complaint(
         "leak", tmp_path / "none.csv", "--cm", "0,0,1.35", "--follow", "--patience", "0.1"
     )
+
+
+def test_law_the_onset_stated_lies_in_its_interval():
+    """Also where another hypothesis, or one tail, has most of the weight elsewhere."""
+    since, until = np.arange(0.0, 20.0), np.arange(1.0, 21.0)
+    rng = np.random.default_rng(4)
+    for weights in (rng.random(20) ** 8 for _ in range(30)):
+        for best in (0, int(weights.argmax()), 19):
+            low, high = _onset_interval(weights, since, until, best)
+            assert low <= since[best] < high
+            assert weights[(since >= low) & (until <= high)].sum() >= 0.95 * weights.sum()

@@ -6,6 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from asflown.estimate.environment import WHEELS_MISREAD
+from asflown.estimate.external import external_torque
 from asflown.estimate.sources import SOURCES, sources
 from asflown.estimate.sources.doubts import NO_CONSTANT, NOT_EXPLAINED, SHORT
 from asflown.kit.errors import BadInput
@@ -103,6 +105,29 @@ def test_trap_what_no_source_explains_is_suspect():
 
     result = sources(changed(tlm, "wheel_rate_RW1", dragged), craft_)
     assert result.doubts.has(NOT_EXPLAINED)
+
+
+def _exchanged(tlm, a, b):
+    c = dict(tlm.channels)
+    one, other = c[f"wheel_rate_{a}"], c[f"wheel_rate_{b}"]
+    c[f"wheel_rate_{a}"], c[f"wheel_rate_{b}"] = replace(one, values=other.values), replace(other, values=one.values)
+    return replace(tlm, channels=c)
+
+
+def test_trap_wheels_that_are_misread_are_named():
+    _, tlm, craft_, _ = flown(8)
+    assert not found(8).doubts.has(WHEELS_MISREAD)
+    assert not external_torque(tlm, craft_, method="momentum").doubts.has(WHEELS_MISREAD)
+    flipped = changed(tlm, "wheel_rate_RW3", lambda c: replace(c, values=-c.values))
+    (one,) = sources(flipped, craft_).doubts.of(WHEELS_MISREAD)
+    (other,) = external_torque(_exchanged(tlm, "RW1", "RW2"), craft_, method="momentum").doubts.of(WHEELS_MISREAD)
+    assert one.is_grave and "RW3 turning" in str(one) and "RW1 and RW2 exchanged" in str(other)
+
+
+def test_law_a_sun_that_stands_still_is_of_another_date():
+    kinds = {d.kind.id for d in found().doubts}
+    assert "environment.sun-of-another-date" in kinds
+    assert not any(d.is_grave for d in found().doubts)
 
 
 def test_trap_a_short_arc_says_so_and_stays_honest():

@@ -25,8 +25,8 @@ from ...kit.errors import BadInput, check_choice, some_of
 from ...kit.timeline import NS
 from ...telemetry.channels import AXES
 from ..subject import OF_THE_SUN, sky_doubts
-from .orbits import carried, gravity_words, longest_gap, orbit_in, refuse_contradictions
-from .sky import Place, Seen, attitude_at, field_at_craft, rods_at, sun_at_craft
+from .orbits import carried, flown_through, gravity_words, longest_gap, orbit_in, refuse_contradictions
+from .sky import Place, Seen, attitude_at, believed_sun, field_at_craft, rods_at, sun_at_craft
 from .term import Term, levers
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def environment_of(
     field, no_field = field_at_craft(tlm, place) if {"dipole", "rods"} & set(which) else (None, "")
     sun, no_sun, of_sun = sun_at_craft(tlm, place) if "sunlight" in which else (None, "", [])
     if "sunlight" in which:
-        of_sun = [*of_sun, *sky_doubts(tlm, craft).of(*OF_THE_SUN)]
+        of_sun = believed_sun(sun, of_sun, sky_doubts(tlm, craft).of(*OF_THE_SUN))
     makers = {
         "gravity-gradient": partial(_gravity, subject, place, why),
         "sunlight": partial(_sunlight, craft, sun, no_sun),
@@ -174,6 +174,8 @@ def _place(subject: Subject, tai_ns: np.ndarray) -> tuple[Place, Doubts, str]:
     refuse_contradictions(tlm, doubts)
     position, velocity, why = None, None, "orbit_position_x, _y, _z, or [orbit] in the craft file"
     if orbit is not None:
+        orbit, gaps = flown_through(orbit, body)
+        doubts = Doubts([*doubts, gaps])
         gap = longest_gap(orbit, float(t[0]), float(t[-1]))
         if gap <= _GAP * 2 * np.pi * np.sqrt(orbit.nearest_m**3 / orbit.mu):
             at = np.clip(t, orbit.time_s[0], orbit.time_s[-1])

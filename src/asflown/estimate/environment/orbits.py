@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...dynamics.environment import MU_EARTH, gravity_gradient_bound
-from ...dynamics.orbit import BODIES, Orbit
+from ...dynamics.orbit import BODIES, J2_EARTH, Orbit, bridged
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput
 from ...kit.timeline import NS
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 #: Fewest positions that tell an orbit.
 FEWEST = 8
+#: The longest gap that is flown through, as a share of a revolution.
+_FLOWN = 0.4
 #: Velocities differ from the slope of the positions by less than this share.
 _UNLIKE = 0.05
 
@@ -72,6 +74,12 @@ VELOCITY_APART = Kind(
     "environment.velocity-apart", Severity.CAUTION,
     "orbit_velocity differs from the change of orbit_position by {percent:.0f} %: the positions are used",
     "Check units and axes of both.",
+)  # fmt: skip
+
+GAPS_FLOWN = Kind(
+    "environment.gaps-flown", Severity.NOTE,
+    "orbit_position is missing {count} times, for up to {longest_s:.0f} s: between, the craft is taken to fall freely from the last to the "
+    "next position",
 )  # fmt: skip
 
 _STEMS = [f"orbit_position_{a}" for a in AXES]
@@ -159,6 +167,13 @@ def gravity_words(I_B: np.ndarray | None, span_s: float) -> Callable[[Orbit], st
         return f"up to {torque:.2g} N m, or {torque * span_s:.2g} N m s over the record"
 
     return words
+
+
+def flown_through(orbit: Orbit, body: str) -> tuple[Orbit, Doubt | None]:
+    """The orbit with gaps of up to ``_FLOWN`` of a revolution flown, and a note of them."""
+    round_s = 2 * np.pi * np.sqrt(orbit.nearest_m**3 / orbit.mu)
+    whole, gaps = bridged(orbit, _FLOWN * round_s, J2_EARTH if body == BODIES[0].name else 0.0)
+    return (whole, GAPS_FLOWN(count=len(gaps), longest_s=max(gaps))) if gaps else (orbit, None)
 
 
 def longest_gap(orbit: Orbit, first_s: float, last_s: float) -> float:

@@ -12,12 +12,13 @@ import numpy as np
 import scipy
 
 from ...dynamics.orbit import BODIES
-from ...kit.doubts import Doubt, Kind, Severity
+from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput
 from ...kit.rotations import rotation
 from ...kit.timeline import NS
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
+from ..subject import SUN_APART
 
 if TYPE_CHECKING:
     from ...dynamics.orbit import Orbit
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 _FEWEST = 8
 #: Beyond it the measured Sun does not stand still. [rad]  A coarse sun sensor errs by a few degrees.
 _SUN_OFF = np.radians(15)
+#: The body turns where the Sun moves through it by this. [rad]
+_TURNED = np.radians(60)
 #: Shadow by the sun sensor and by geometry may differ for so long at an edge. [s]
 _EDGE_S = 60.0
 #: Longest stretch over which the Sun stands still: it moves by 1 degree a day. [s]
@@ -36,6 +39,14 @@ SUN_TURNS = Kind(
     "environment.sun-turns", Severity.SUSPECT,
     "the measured Sun does not stay where it is in inertial axes: it wanders by {off_deg:.0f} degrees (rms)",
     "Check the body axes of the sun sensor against those of the quaternion.",
+)  # fmt: skip
+
+
+SUN_OF_ANOTHER_DATE = Kind(
+    "environment.sun-of-another-date", Severity.CAUTION,
+    "the measured Sun stands still in inertial axes while the body turns, so its sensor and the quaternion fit each other; but on that date "
+    "it is {off_deg:.0f} degrees from there: date or inertial axes are another's.  The sensor is believed, for the shadow too",
+    "Check the epoch, and that quaternion and orbit are in the same inertial axes (GCRS, J2000).",
 )  # fmt: skip
 
 
@@ -149,6 +160,20 @@ def sun_at_craft(telemetry: Telemetry, place: Place) -> tuple[Seen | None, str, 
     if place.at_earth:
         lit, whole = _shadow(sun_N, lit, whole, place)
     return Seen(place.to_body(sun_N), whole, lit), "", doubts
+
+
+def believed_sun(sun: Seen | None, own: list[Doubt], apart: Doubts) -> list[Doubt]:
+    """Doubts about the Sun: ``own`` of its steadiness, and ``apart``, what date and orbit say against it.
+
+    A sensor or a quaternion that is misread makes the Sun wander as the body turns.  One that stands still is of another date, and the
+    shadow of this one says nothing against it."""
+    elsewhere = apart.of(SUN_APART)
+    if sun is None or own or not elsewhere:
+        return [*own, *apart]
+    seen = sun.u_B[sun.share > 0.5]
+    if not len(seen) or float(_angle(seen, seen[:1]).max()) < _TURNED:
+        return [*own, *apart]
+    return [SUN_OF_ANOTHER_DATE(off_deg=d.numbers["off_deg"]) for d in elsewhere]
 
 
 def _modelled_sun(place: Place) -> np.ndarray | str:

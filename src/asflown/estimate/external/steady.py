@@ -29,7 +29,7 @@ from ...kit.rotations import rotation
 from ...kit.timeline import NS
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
-from ..environment import known_terms
+from ..environment import known_terms, misread_in
 from ..redundancy import redundancy
 from ..subject import (
     FEWEST,
@@ -255,7 +255,7 @@ class _Course:
     G: np.ndarray
     unknown: np.ndarray
     turn_from: str
-    doubts: list[Doubt]
+    doubts: Sequence[Doubt | None]
     turn_sigma: np.ndarray | None = None
     turn: np.ndarray | None = None
     gyroscopic: np.ndarray | None = None
@@ -348,7 +348,8 @@ def _momentum(subject: Subject, frame: str, taken: _Taken) -> ExternalTorqueResu
             channel="body_rate_x",
             remedy="Narrow the span to a hold and use --method drift.",
         )
-    t, doubts, unknown = s.seconds, [], np.zeros(3)
+    doubts: list[Doubt | None] = []
+    t, unknown = s.seconds, np.zeros(3)
     if s.attitude is not None:
         from_start, turn_from = s.attitude[0].inv(), "quaternion"
     elif frame == "inertial":
@@ -362,6 +363,7 @@ def _momentum(subject: Subject, frame: str, taken: _Taken) -> ExternalTorqueResu
     else:
         G = t[:, None, None] * from_start.as_matrix()
     y = s.momentum - taken.brought(s, s.turned)
+    doubts.append(misread_in(subject, s))
     return _fitted(subject, s, _Course("momentum", frame, y, s.turned, G, unknown, turn_from, doubts), taken)
 
 

@@ -61,7 +61,7 @@ def diagnosed(
         thruster=names[k],
         posterior=dict(zip(names, posterior.tolist(), strict=True)),
         onset_s=float(since[b]),
-        onset_ci95_s=_onset_interval(weights.sum(axis=1), since, time_s[e.onset]),
+        onset_ci95_s=_onset_interval(weights.sum(axis=1), since, time_s[e.onset], b),
     )
     C = e.free_c[b]
     torque = np.linalg.solve(C, e.free_d[b])
@@ -91,8 +91,18 @@ def diagnosed(
     return found, [d for d in doubts if d is not None]
 
 
-def _onset_interval(weights, since, until) -> tuple[float, float]:
-    """95 % interval of the onset; each candidate, of these ``weights``, lies between ``since`` and ``until``."""
-    share = np.cumsum(weights)
-    low, high = (int(np.searchsorted(share, q)) for q in (0.025, 0.975))
-    return float(since[low]), float(until[min(high, len(since) - 1)])
+def _onset_interval(weights: np.ndarray, since: np.ndarray, until: np.ndarray, best: int) -> tuple[float, float]:
+    """The shortest 95 % interval of the onset that holds the ``best`` candidate; each, of these ``weights``, lies between ``since`` and
+    ``until``.  It grows from the best to the side that is likelier per second, so that no far tail moves it off what is stated."""
+    dense = np.r_[0.0, weights / np.maximum(np.diff(until, prepend=since[0]), 1e-9), 0.0]
+    low = high = best
+    held, whole = weights[best], weights.sum()
+    while held < 0.95 * whole and (low > 0 or high < len(weights) - 1):
+        if high == len(weights) - 1 or (low > 0 and dense[low] >= dense[high + 2]):
+            low -= 1
+            held += weights[low]
+        else:
+            high += 1
+            held += weights[high]
+    # a candidate stands for the instants since the one before it that is kept
+    return float(until[low - 1] if low else since[0]), float(until[high])

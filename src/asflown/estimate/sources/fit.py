@@ -9,7 +9,8 @@ import numpy as np
 from ...kit.doubts import Doubt, Doubts
 from ...kit.errors import BadInput, check_choice
 from ...kit.result import recorded
-from ..subject import PER_SPIN_INERTIA, subject_of
+from ..environment import misread_wheels
+from ..subject import PER_SPIN_INERTIA, actuators, subject_of
 from .compare import Model, compare
 from .doubts import NO_CONSTANT, NO_SOURCE, fit_doubts
 from .gather import ALONE, DENSITY, Arc, gather, with_harmonics
@@ -128,6 +129,7 @@ def _result(
     left_out = {n: w for n, w in around.left_out.items() if n in asked or n == "gravity-gradient"}
     doubts = [
         *subject.doubts, *arc.doubts, *(NO_SOURCE(source=n, needs=w) for n, w in left_out.items()), *_constant(average, arc),
+        _misread(subject, arc),
         *fit_doubts(white, theta, residual, models, shown, relative=subject.relative),
         PER_SPIN_INERTIA(what="the torque is") if subject.relative else None,
     ]  # fmt: skip
@@ -170,6 +172,16 @@ def _constant(found: Averaged | None, arc: Arc) -> list[Doubt]:
     if column is None or factor < _WORSE:
         return []
     return [NO_CONSTANT(percent=100 * found.chance, factor=float(factor), what=words(column))]
+
+
+def _misread(subject: Subject, arc: Arc) -> Doubt | None:
+    """A doubt about wheels whose axes or channels are not what they are taken for."""
+    each = arc.each
+    if not each.shape[1]:
+        return None
+    stored = actuators(subject)[0]
+    names = [c.member if c.kind.stem == "wheel_rate" else c.name for c, _ in stored]
+    return misread_wheels(arc.momentum, arc.Z, each, np.array([d for _, d in stored]), names)
 
 
 def _told(arc: Arc, found: Posterior) -> dict[int, Told]:

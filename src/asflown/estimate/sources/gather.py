@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 _BLOCKS, _SHORTEST_S = 600, 2.0
 #: What columns of the density's higher harmonics are called.
 DENSITY = "density"
+#: What columns of the wheels' spin inertia are called.
+SPIN = "spin inertia"
 #: A stretch without samples after which the momentum starts anew. [s]
 _GAP_S = 60.0
 #: One sigma of a gyro's bias where no quaternion tells it: a good small gyro's. Assumed. [rad/s]
@@ -98,6 +100,13 @@ class Arc:
         """Way round the orbit at the blocks' middles. (K,)"""
         whole = self.environment.phase_rad
         return None if whole is None else np.interp(self.tai_ns, self.environment.tai_ns, whole)
+
+    @property
+    def each(self) -> np.ndarray:
+        """Momentum of each wheel, body axes. (K, n, 3) [N m s]"""
+        at = [k for k, c in enumerate(self.columns) if c.name.startswith(SPIN)]
+        sigma = np.array([self.columns[k].sigma for k in at])
+        return -np.swapaxes(self.Z[:, :, at] / sigma, 1, 2)
 
     def of(self, source: str) -> np.ndarray:
         """Which columns belong to a source."""
@@ -306,7 +315,7 @@ def _columns(subject: Subject, course: _Course, around: Environment, which: Sequ
         spin = SPIN_SHARE if not subject.relative else 1e-6
         add(
             "",
-            [f"spin inertia {k}" for k in range(course.each.shape[1])],
+            [f"{SPIN} {k}" for k in range(course.each.shape[1])],
             "",
             spin,
             momentum=-np.swapaxes(course.each, 1, 2),

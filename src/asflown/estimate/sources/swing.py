@@ -107,9 +107,7 @@ def _reduced(white: Whitened) -> tuple[np.ndarray, np.ndarray]:
     return info[np.ix_(held, held)] - across.T @ inner, np.flatnonzero(of)
 
 
-def posterior(
-    white: Whitened, sources: tuple[str, ...], cells: int = _GRID, constant: float = 1.0
-) -> Posterior:
+def posterior(white: Whitened, sources: tuple[str, ...], cells: int = _GRID, constant: float = 1.0) -> Posterior:
     """With the unknowns of ``sources``, those of the inertia, and those of no source.
 
     ``cells``: of the grid in amplitude and in phase; it is refined until a third of them count either way.  ``constant``: sigma of
@@ -140,7 +138,9 @@ def posterior(
     w = np.exp(evidence[counted] - evidence.max())
     covariance = np.linalg.inv(N[counted])
     whole = float(evidence.max() + np.log(w.sum() * step * turn / (2 * np.pi * _MOST)))
-    return Posterior(kept, w / w.sum(), x[counted], covariance, swing[counted], float(best.max()) - white.log_size, whole)
+    return Posterior(
+        kept, w / w.sum(), x[counted], covariance, swing[counted], float(best.max()) - white.log_size, whole
+    )
 
 
 @dataclass(frozen=True)
