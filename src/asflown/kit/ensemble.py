@@ -97,9 +97,11 @@ def paths(g: Gains, residual: np.ndarray, states, rng: np.random.Generator) -> n
 
 
 def _roots(Q: np.ndarray) -> np.ndarray:
-    """Matrices B with B B^T = Q, also for singular Q."""
-    w, V = np.linalg.eigh(Q)
-    return V * np.sqrt(np.maximum(w, 0.0))[:, None, :]
+    """Matrices B with B B^T = Q, also for singular Q and rows of very different size."""
+    size = np.sqrt(np.diagonal(Q, axis1=1, axis2=2))
+    size = np.where(size > 0, size, 1.0)
+    w, V = np.linalg.eigh(Q / (size[:, :, None] * size[:, None, :]))
+    return size[:, :, None] * V * np.sqrt(np.maximum(w, 0.0))[:, None, :]
 
 
 @jit

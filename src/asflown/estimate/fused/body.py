@@ -7,6 +7,8 @@ state of one size.
     T'     = slope
     slope' = -2 k slope - k^2 T + w        k = sqrt(3)/length: a Matern-3/2 torque of a given size
                                            k = 0: an integrated Wiener process; k = 0, w = 0: a straight line
+    slope' = k^2 c                         ``curved``, with a third state: a Matern-5/2 torque, k = sqrt(5)/length, whose
+    c'     = -k T - 3 slope - 3 k c + w    curvature k^2 c is continuous too
 """
 
 from __future__ import annotations
@@ -45,6 +47,7 @@ class Body:
 
     inertia_kgm2: float
     wiener: bool = False
+    curved: bool = False
 
     RATE: ClassVar[int]  # index of the body rate, and of the actuators' momentum
     STORED: ClassVar[int]
@@ -52,20 +55,21 @@ class Body:
     NARROWS: ClassVar[bool] = True  # whether the data may say how far off what is taken as known is
 
     @property
-    def states(self) -> int:
-        """How many."""
+    def torque(self) -> int:
+        """Index of the torque, and number of the states before it."""
         raise NotImplementedError
 
     @property
-    def torque(self) -> int:
-        return self.states - 2
+    def slope(self) -> int:
+        return self.torque + 1
 
     @property
-    def slope(self) -> int:
-        return self.states - 1
+    def states(self) -> int:
+        """How many."""
+        return self.torque + (3 if self.curved else 2)
 
     def dynamics(self, v) -> tuple[np.ndarray, np.ndarray]:
-        """F and spectral density of all but the torque's own two rows."""
+        """F and spectral density of all but the torque's own rows."""
         raise NotImplementedError
 
     def measured(self, v) -> tuple[np.ndarray, np.ndarray]:
@@ -73,7 +77,7 @@ class Body:
         raise NotImplementedError
 
     def start(self, v, times: Times) -> np.ndarray:
-        """Standard deviation of every state but the torque's two at the first instant."""
+        """Standard deviation of every state but the torque's own at the first instant."""
         raise NotImplementedError
 
     def timing_s(self, v) -> float:  # noqa: ARG002
@@ -91,29 +95,45 @@ class Body:
         the quantities as given."""
         raise NotImplementedError
 
-    def model(self, v, times: Times, length_s: float, size_Nm) -> Model:
-        """The model at the instants of a pass; ``size_Nm``: of the torque, one for all or (N,)."""
+    def model(self, v, times: Times, length_s: float, size_Nm, steps_Nm: np.ndarray | None = None) -> Model:
+        """The model at the instants of a pass; ``size_Nm``: of the torque, one for all or (N,); ``steps_Nm``: (N,), a random walk
+        of the torque beside, in a second."""
         F, Q = self.dynamics(v)
-        k = np.sqrt(3) / length_s
-        F[self.torque, self.slope] = 1
-        if not self.wiener:
-            F[self.slope, [self.torque, self.slope]] = -(k**2), -2 * k
-        drive = 4 * k**3 / self.inertia_kgm2**2
+        driven_state, drive, start = self._free_torque(F, length_s)
+        drive = drive / self.inertia_kgm2**2
         one = np.ndim(size_Nm) == 0  # no part of the noise differs from step to step
         if one:
-            Q[self.slope, self.slope] = drive * size_Nm**2
+            Q[driven_state, driven_state] = drive * size_Nm**2
         A, fixed = discretize(F, Q, times.steps_s)
         driven, scale = np.empty((0, *A.shape)), np.empty((len(times.seconds), 0))
-        if not one:
-            D = np.zeros_like(Q)
-            D[self.slope, self.slope] = drive
-            driven, scale = discretize(F, D, times.steps_s)[1][None], np.square(size_Nm)[:, None]
+        for state, by, size in ((driven_state, drive, None if one else size_Nm), (self.torque, 1 / self.inertia_kgm2**2, steps_Nm)):
+            if size is not None:
+                D = np.zeros_like(Q)
+                D[state, state] = by
+                driven = np.concatenate([driven, discretize(F, D, times.steps_s)[1][None]])
+                scale = np.column_stack([scale, np.square(size)])
         # a Wiener torque has no size of its own: it starts within ten times what a Matern one would be
         first = np.ravel(size_Nm)[0] / self.inertia_kgm2 * (10 if self.wiener else 1)
-        deviation = np.array([*self.start(v, times), first, k * first])
+        covariance = np.zeros_like(Q)
+        np.fill_diagonal(covariance[: self.torque, : self.torque], self.start(v, times) ** 2)
+        covariance[self.torque :, self.torque :] = first**2 * start
         H, white = self.measured(v)
         H, R = H[times.base], (white**2 + times.quantum**2 / 12)[times.base] + (self.timing_s(v) * times.steep) ** 2
-        return Model(A, fixed, driven, scale, times.which, H, R, np.zeros(self.states), np.diag(deviation**2))
+        return Model(A, fixed, driven, scale, times.which, H, R, np.zeros(self.states), covariance)
+
+    def _free_torque(self, F: np.ndarray, length_s: float) -> tuple[int, float, np.ndarray]:
+        """Lay a torque of unit size into F: the state that is driven, by how much, and the stationary covariance of its states."""
+        T, S = self.torque, self.slope
+        F[T, S] = 1
+        if not self.curved:
+            k = np.sqrt(3) / length_s
+            if not self.wiener:
+                F[S, [T, S]] = -(k**2), -2 * k
+            return S, 4 * k**3, np.diag([1, k**2])
+        k, C = np.sqrt(5) / length_s, S + 1
+        F[S, C] = k**2
+        F[C, [T, S, C]] = -k, -3, -3 * k
+        return C, 16 / 3 * k, np.array([[1, 0, -1 / 3], [0, k**2 / 3, 0], [-1 / 3, 0, 1]])
 
     def smooth_model(self, v, times: Times) -> Model:
         """With the torque of the fitted levels."""

@@ -80,6 +80,11 @@ def all_candidates(instants: int) -> bool:
     return instants <= _CANDIDATES + 1
 
 
+def is_slow(axis: AxisData) -> bool:
+    """Whether the torque of the fitted levels is a slow one, with edges in it."""
+    return axis.levels.length_s > _SLOW_S
+
+
 @dataclass(frozen=True)
 class _Way:
     """One roughness: its filter, the columns whitened by it, and their normal equations."""
@@ -241,7 +246,7 @@ def draw_torques(axis: AxisData, count: int, rng: Generator) -> Posterior:
     between the edges (``suspects``).  Where the first draws do not explain the data as well as a smooth torque does, the sampler is given ten times
     as many proposals; ``Posterior.explained`` says whether they did in the end."""
     wanted = axis.times.seconds[axis.times.wanted]
-    if not all_candidates(len(wanted)) or axis.levels.length_s > _SLOW_S:
+    if not all_candidates(len(wanted)) or is_slow(axis):
         return _in_long(axis, wanted, count, rng)
     search = _Search.of_bends(axis, wanted, rng)
     ways, found = _ways(search, count)
@@ -269,15 +274,17 @@ def _in_long(axis: AxisData, wanted: np.ndarray, count: int, rng: Generator) -> 
     """As ``draw_torques``, of a slow torque, or of a record with more instants than candidates can be."""
     found = suspects(axis)
     at, length, each = _ramps(found, wanted)
-    search = _Search.of_ramps(replace(axis, levels=found.levels), at, length, each, rng)
-    ways = [search.way(found.levels.torque_Nm, found.levels.length_s)]
+    levels = found.axis.levels
+    search = _Search.of_ramps(found.axis, at, length, each, rng)
+    ways = [search.way(levels.torque_Nm, levels.length_s)]
     start = [search.fixed + int(np.argmin(np.abs(at - t) + np.abs(np.log(length / 8.0)))) for t in found.edges]
     walked = _walked(search, ways, np.ones(1), np.unique(np.array(start, np.int64)), count, (1, _FURTHER), _FAR)
     drawn = walked.drawn
     torque = search.torques(ways, axis.data.value, drawn)
     settings = {
         "edges": float(drawn.corners.mean()), "edges_found_s": found.edges.tolist(), "suspects": len(found.seconds),
-        "torque_between_edges_Nm": found.levels.torque_Nm, "length_between_edges_s": found.levels.length_s, **walked.settings,
+        "torque_between_edges_Nm": levels.torque_Nm, "length_between_edges_s": levels.length_s,
+        "curved_between_edges": found.axis.body.curved, **walked.settings,
     }  # fmt: skip
     considered = drawn.bends[:, 2 : search.fixed]
     return walked.widened(Posterior(torque.mean(axis=0), torque, considered, walked.left, settings, walked.explained))

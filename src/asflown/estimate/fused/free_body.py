@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ...kit.smoother import Smoothed
     from .body import AxisData
 
-_RATE, _STORED, _FREE, _FREE_SLOPE, _ANGLE, _HELD, _ERROR, _TORQUE, _STATES = 0, 1, 2, 3, 4, 5, 6, 7, 9
+_RATE, _STORED, _FREE, _FREE_SLOPE, _ANGLE, _HELD, _ERROR, _TORQUE = 0, 1, 2, 3, 4, 5, 6, 7
 
 
 @dataclass(frozen=True)
@@ -59,17 +59,17 @@ class FreeBody(Body):
     NARROWS: ClassVar[bool] = False
 
     @property
-    def states(self) -> int:
-        return _STATES
+    def torque(self) -> int:
+        return _TORQUE
 
     def control(self, v: FreeLevels) -> np.ndarray:
         """The actuators' torque on the body per unit inertia, (n,), of the states."""
-        u = np.zeros(_STATES)
+        u = np.zeros(self.states)
         u[[_FREE, _RATE, _HELD, _ANGLE]] = 1, -1 / v.damping_s, 1 / v.damping_s, -1 / (v.damping_s * v.turning_s)
         return u
 
     def dynamics(self, v: FreeLevels) -> tuple[np.ndarray, np.ndarray]:
-        F, Q = np.zeros((2, _STATES, _STATES))
+        F, Q = np.zeros((2, self.states, self.states))
         F[_RATE] = self.control(v)
         F[_STORED] = -F[_RATE]
         F[_RATE, _TORQUE] = 1
@@ -96,7 +96,7 @@ class FreeBody(Body):
         }
 
     def measured(self, v: FreeLevels) -> tuple[np.ndarray, np.ndarray]:
-        H = np.zeros((len(ROWS), _STATES))
+        H = np.zeros((len(ROWS), self.states))
         H[BODY_RATE, [_RATE, _ERROR]] = 1
         H[MOMENTUM, _STORED] = self.inertia_kgm2
         H[CONTROL_TORQUE] = self.inertia_kgm2 * self.control(v)

@@ -28,7 +28,7 @@ from ...kit.smoother import smooth
 from ...telemetry.channels import AXES
 from ..subject import INERTIA_SHARE, SPIN_SHARE, Grid, Subject
 from .body import AxisData, Body, Known
-from .corners import all_candidates, draw_torques
+from .corners import all_candidates, draw_torques, is_slow
 from .free_body import FreeBody
 from .gather import CannotFuse, Record, gather, needed
 from .held_body import HeldBody
@@ -36,6 +36,7 @@ from .innovations import Innovations, by_channel, considered_doubts, innovation_
 from .levels import AxisFit, fit_doubts, fit_levels, unfitted
 from .series import ATTITUDE_ERROR
 from .smooth_torque import gaussian_torque, widened
+from .suspects import freed
 from .turning import COMMAND_SMOOTHED, CommandNotKnown, check_turn
 
 if TYPE_CHECKING:
@@ -298,7 +299,7 @@ def _motion(bodies: dict[int, Body], fits: dict[int, AxisFit], record: Record) -
     sigma = np.full(3, np.inf)
     for j, body in bodies.items():
         axis = AxisData.of(body, fits[j].levels, fits[j].series, record.grid.seconds)
-        best, wanted = smooth(axis.model, axis.data), axis.times.wanted
+        best, wanted = smooth(freed(axis) if is_slow(axis) else axis.model, axis.data), axis.times.wanted
         x = best.mean[wanted]
         F, _ = body.dynamics(axis.levels)
         F[body.torque, body.slope] = 1

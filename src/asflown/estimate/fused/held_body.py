@@ -90,8 +90,8 @@ class HeldBody(Body):
         return 4 * self.filter_damping / self.filter_rad_s + self.delay_s
 
     @property
-    def states(self) -> int:
-        return 10 if self.late_s else 6
+    def torque(self) -> int:
+        return 8 if self.late_s else 4
 
     def dynamics(self, v: LoopLevels) -> tuple[np.ndarray, np.ndarray]:
         n, stiffness = self.states, -self.kd_per_s * self.kp_per_s

@@ -20,6 +20,8 @@ from .series import ROWS, Series, step_of
 OUTLYING, _MOST_OUTLYING = 5.0, 0.1
 #: A bad sample makes its neighbours look bad: of those this close only the worst is left out at a time. [s]
 _NEIGHBOURS_S = 20.0
+#: Where a larger share of a channel's samples this close is contradicted they are good: the torque has an edge there.
+_STRETCH = 0.5
 #: An offset between channels is corrected when it is this sure, and this large. [sigma], [s]
 _SURE, _WORTH_S = 4.0, 0.2
 #: Furthest offset looked for. [s]
@@ -103,8 +105,16 @@ def _without_outliers(body: Body, levels: Levels, series, known: Known | None, l
         if left_out > most:
             return series
         if not len(worst):
-            return kept
+            return [_with_stretches(before, after) for before, after in zip(series, kept, strict=True)] if left_out else series
         kept = _without(kept, axis, worst)
+
+
+def _with_stretches(before: Series, after: Series) -> Series:
+    """A series less its outliers, but with those of whole stretches."""
+    gone = ~np.isin(before.seconds, after.seconds)
+    sums, at = np.append(0, np.cumsum(gone)), before.seconds
+    first, last = np.searchsorted(at, at - _NEIGHBOURS_S), np.searchsorted(at, at + _NEIGHBOURS_S, "right")
+    return before.where(~gone | (sums[last] - sums[first] > _STRETCH * (last - first)))
 
 
 def _worst(alone: np.ndarray, at_s: np.ndarray, limit: float) -> np.ndarray:

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 _EDGE, _SUSPECT = 3.5, 2.5
 #: How far from a suspect corners are looked for, and how far from an edge the torque is free. [s]
 NEAR_S, _FREE_S = 15.0, 10.0
-#: By how much the torque's size is larger there.
-_FREELY = 30.0
+#: By what share of its size it moves there.
+_FREELY = 0.3
 #: An edge makes its surroundings look like edges: the surest within this is taken, then they are looked at again. [s]
 _APART_S = 150.0
 #: Edges are looked for under a torque this many times smaller than was fitted with them in it; so many are taken at once, if they
@@ -37,16 +37,37 @@ _MOST_AN_HOUR = 15
 
 @dataclass(frozen=True)
 class Suspects:
-    """Instants (S,) near which corners are looked for [s], the edges (E,) among them, and the levels of the torque between edges."""
+    """Instants (S,) near which corners are looked for [s], the edges (E,) among them, and the axis with the levels, and the kind, of
+    the torque between edges."""
 
     seconds: np.ndarray
     edges: np.ndarray
-    levels: Levels
+    axis: AxisData
 
 
 def suspects(axis: AxisData) -> Suspects:
-    """Of an axis whose known torque is taken off."""
-    levels, edges, cost = axis.levels, np.empty(0), _cost(axis, axis.levels, np.empty(0))
+    """Of an axis whose known torque is taken off.
+
+    Between edges the torque of a craft in orbit is smoother than most: the data choose between one of continuous slope and one of
+    continuous curvature."""
+    rough, curved = axis, replace(axis, body=replace(axis.body, curved=not axis.body.wiener))
+    found = _suspects(curved)
+    levels, cost = _between(rough, axis.levels, found.edges)
+    if cost < _cost(curved, found.axis.levels, found.edges):
+        return replace(found, axis=replace(rough, levels=levels))
+    return found
+
+
+def freed(axis: AxisData) -> Model:
+    """The model of the fitted levels, its torque free to move wherever the data ask for a kick: an edge taken for a smooth torque
+    makes a motion that never was."""
+    at = axis.times.seconds
+    return _model(axis, axis.levels, at[_kick(axis, axis.levels, np.empty(0)) > _EDGE])
+
+
+def _suspects(axis: AxisData) -> Suspects:
+    edges = np.empty(0)
+    levels, cost = _between(axis, axis.levels, edges)
     for most in (_AT_ONCE, _AT_ONCE, 1):
         smoother = replace(levels, torque_Nm=levels.torque_Nm / _SMOOTHER)
         seconds, size = _kicks(axis, smoother, edges, _APART_S)
@@ -59,23 +80,20 @@ def suspects(axis: AxisData) -> Suspects:
             levels, edges, cost = found, trial, then
     seconds, size = _kicks(axis, levels, edges, NEAR_S)
     most = max(1, round(_MOST_AN_HOUR * np.ptp(axis.times.seconds) / 3600))
-    return Suspects(np.append(edges, seconds[np.argsort(-size)[:most]]), edges, levels)
+    return Suspects(np.append(edges, seconds[np.argsort(-size)[:most]]), edges, replace(axis, levels=levels))
 
 
 def _model(axis: AxisData, levels: Levels, edges: np.ndarray) -> Model:
     """Of the smooth torque, free to move near the edges."""
-    size = np.full(len(axis.times.seconds), levels.torque_Nm)
-    for t in edges:
-        size[np.abs(axis.times.seconds - t) <= _FREE_S] *= _FREELY
-    return axis.body.model(axis.levels, axis.times, levels.length_s, size)
+    at, edges = axis.times.seconds, np.sort(edges)
+    near = np.searchsorted(edges, at + _FREE_S, "right") > np.searchsorted(edges, at - _FREE_S)
+    moves = near * _FREELY * levels.torque_Nm / np.sqrt(2 * _FREE_S) if near.any() else None
+    return axis.body.model(axis.levels, axis.times, levels.length_s, levels.torque_Nm, moves)
 
 
 def _kicks(axis: AxisData, levels: Levels, edges: np.ndarray, apart_s: float) -> tuple[np.ndarray, np.ndarray]:
     """Instants of the suspects away from the edges and how sure each is, none this near a surer one."""
-    at = axis.times.seconds
-    kick = np.abs(score(_model(axis, levels, edges), axis.data).kick[:, [axis.body.torque, axis.body.slope]]).max(
-        axis=1
-    )
+    at, kick = axis.times.seconds, _kick(axis, levels, edges)
     for t in edges:
         kick[np.abs(at - t) <= NEAR_S] = 0.0
     kick[np.minimum(at - at[0], at[-1] - at) < NEAR_S] = 0.0  # the start is free as it is, and the end nearly so
@@ -86,6 +104,12 @@ def _kicks(axis: AxisData, levels: Levels, edges: np.ndarray, apart_s: float) ->
         found.append(worst)
         left = left[np.abs(at[left] - at[worst]) > apart_s]
     return at[found], kick[found]
+
+
+def _kick(axis: AxisData, levels: Levels, edges: np.ndarray) -> np.ndarray:
+    """How sure a kick of the torque or its slope is at each instant, (N,) [sigma]."""
+    kicks = score(_model(axis, levels, edges), axis.data).kick
+    return np.abs(kicks[:, [axis.body.torque, axis.body.slope]]).max(axis=1)
 
 
 def _cost(axis: AxisData, levels: Levels, edges: np.ndarray) -> float:
