@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from ..kit.config import read_bytes
 from ..kit.doubts import Doubt, Doubts, Kind, Severity
 from ..kit.errors import BadInput, some_of
 from ..kit.files import sha256_of
+from ..kit.reading import read_bytes, reading
 from ..kit.result import Input
 from .adjust import SCALE, Adjustment, Ledger, entered, scale_corrected
 from .columns import Columns, read_table
@@ -206,7 +206,7 @@ def load_maneuvers(path: str | Path) -> Maneuvers:
         For anything that cannot be read, with file, line and column.
     """
     path = Path(path)
-    try:
+    with reading(path, "docs/maneuvers.md lists the columns."):
         data = read_bytes(path, "maneuver table", "Give a CSV, Parquet or TOML file.")
         whole = Columns(read_table(path, data))
         whole.need("id")
@@ -218,8 +218,6 @@ def load_maneuvers(path: str | Path) -> Maneuvers:
         excluded = tuple((i, reason) for i, reason in zip(ids, reasons, strict=True) if reason)
         found = replace(found, source=str(path), inputs=(Input(str(path), sha256_of(data)),), excluded=excluded)
         return _doubted(_one_spelling(_in_order(found)))
-    except BadInput as why:
-        raise why.within(path) from None
 
 
 def _ids(columns: Columns) -> tuple[str, ...]:
