@@ -70,7 +70,7 @@ def test_bad_lists_are_refused(tmp_path, change, says):
 def test_bad_csv_rows_name_their_line(tmp_path):
     with pytest.raises(BadInput, match="not a number") as why:
         load_events(listed(tmp_path, CSV.replace("a.csv,60,", "a.csv,soon,"), "events.csv"))
-    assert why.value.line == 2
+    assert why.value.line == 3  # comments count
     with pytest.raises(BadInput, match="number of cells"):
         load_events(listed(tmp_path, CSV + "c,stow\n", "events.csv"))
 

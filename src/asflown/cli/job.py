@@ -204,11 +204,13 @@ class Job:
             for kept in trends.add(entries):
                 say(f"kept as {kept.event}, revision {kept.revision}")
 
-    def may_write(self, place: Path, kind: str, read: Iterable[str | Path] = ()) -> None:
-        """Raise BadInput where this output would replace an input (``read``: further ones), or a file that is not ours of its kind."""
+    def may_write(self, place: Path, kind: str, read: Iterable[str | Path] = (), ours: bool | None = None) -> None:
+        """Raise BadInput where this output would replace an input (``read``: further ones), or a file that is not ours of its kind.
+
+        ``ours``: whether an existing file is, where its kind has no room for a remark."""
         from ..kit.files import check_output
 
-        check_output(place, kind, inputs=[*self.inputs, *read], force=Asked.force)
+        check_output(place, kind, inputs=[*self.inputs, *read], force=Asked.force, ours=ours)
 
     @property
     def inputs(self) -> list[str]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..kit.config import read_bytes, toml_table, validated
 from ..kit.errors import BadInput, some_of
+from ..kit.reading import reading
 from ..kit.result import inputs_of
 from .model import Craft
 
@@ -64,7 +65,9 @@ def load_craft(name_or_file: str | Path, *, inertia=None, cm=None) -> Craft:
                 remedy=f"Built in: {some_of(built_in_crafts())}. For your own, give {there}.",
             )
         source = (_profiles() / f"{name}.toml").read_bytes()
-    craft = validated(Craft, toml_table(source, name), name, "See docs/craft.md for the keys and their units.")
+    keys = "See docs/craft.md for the keys and their units."
+    with reading(name, keys):
+        craft = validated(Craft, toml_table(source, name), name, keys)
     craft._inputs = inputs_of(path) if path.suffix == ".toml" or "/" in text else ()
     if alternative:
         craft = craft.with_alternative(alternative)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
 
-from ..kit.config import read_bytes
+from ..kit.config import read_bytes, validated
 from ..kit.errors import BadInput
 
 if TYPE_CHECKING:
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 #: Elevation of a pyramid's axes at which four wheels store the same momentum along x, y and z. [deg]
 CANT_DEG = 35.2644
 
+_Number = Annotated[float, Field(gt=-1e9, lt=1e9, allow_inf_nan=False)]
+_Row = Annotated[list[_Number], Field(min_length=3, max_length=3)]
 _JSON = "Its keys: craft, inertia_kg_m2 (3 x 3) and wheels [{name, axis, spin_inertia_kg_m2}], as `asflown craft show --json` prints them."
 _PLACEHOLDER = "the craft file still has the template's placeholders: inertia and spin inertia are no one's"
 
@@ -54,6 +57,23 @@ _SURROUNDINGS = (
 )
 
 
+class _ToldWheel(BaseModel):
+    model_config = ConfigDict(strict=True, extra="ignore")
+
+    name: str = Field(min_length=1, max_length=60)
+    axis: list[_Number] = Field(min_length=3, max_length=3)
+    spin_inertia_kg_m2: Annotated[float, Field(gt=0, lt=1e6, allow_inf_nan=False)] | None = None
+
+
+class _Told(BaseModel):
+    """What is read of a JSON description: numbers are numbers, not text."""
+
+    model_config = ConfigDict(strict=True, extra="ignore")
+
+    wheels: list[_ToldWheel] = Field(min_length=1, max_length=24)
+    inertia_kg_m2: Annotated[list[_Row], Field(min_length=3, max_length=3)] | None = None
+
+
 @dataclass(frozen=True)
 class Outline:
     """What a template is filled with; None: a placeholder stands there."""
@@ -87,15 +107,13 @@ def outline_of(file: str | Path) -> Outline:
     source = read_bytes(file, "JSON file", _JSON)
     try:
         told = json.loads(source)
-        wheels = [(str(w["name"]), np.array(w["axis"], float), w.get("spin_inertia_kg_m2")) for w in told["wheels"]]
-        lengths = [float(np.linalg.norm(a)) for _, a, _ in wheels]
-        spins = tuple(None if s is None else float(s) for _, _, s in wheels)
-        given = told.get("inertia_kg_m2")
-        I_B = None if given is None else np.array(given, float).reshape(3, 3)
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as why:
-        raise BadInput(
-            f"this JSON does not describe a craft ({type(why).__name__}: {why})", file=file, remedy=_JSON
-        ) from None
+    except (ValueError, RecursionError) as why:
+        raise BadInput(f"this JSON does not describe a craft ({str(why)[:100]})", file=file, remedy=_JSON) from None
+    craft = validated(_Told, told if isinstance(told, dict) else {}, file, _JSON)
+    wheels = [(w.name, np.array(w.axis, float), w.spin_inertia_kg_m2) for w in craft.wheels]
+    lengths = [float(np.linalg.norm(a)) for _, a, _ in wheels]
+    spins = tuple(s for _, _, s in wheels)
+    I_B = None if craft.inertia_kg_m2 is None else np.array(craft.inertia_kg_m2, float)
     if not wheels or any(len(a) != 3 or not abs(n - 1) < 1e-3 for (_, a, _), n in zip(wheels, lengths, strict=True)):
         raise BadInput("an axis is not a unit vector, or there are no wheels", file=file, remedy=_JSON)
     if I_B is not None and not np.allclose(I_B, I_B.T, rtol=1e-9, atol=1e-9 * float(np.abs(I_B).max())):

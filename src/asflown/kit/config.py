@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import tomllib
 from difflib import get_close_matches
-from pathlib import Path
 from typing import TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
 from .errors import BadInput
+from .reading import read_bytes, reading
+
+__all__ = ["changes_of", "read_bytes", "toml_table", "validated"]
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -17,27 +19,21 @@ Model = TypeVar("Model", bound=BaseModel)
 def toml_table(source: bytes, file: object) -> dict:
     """The content of a TOML file.  Raises BadInput, naming the place, where it is not TOML."""
     try:
-        return tomllib.loads(source.decode("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as why:
-        raise BadInput(f"not a TOML file ({why})", file=file, remedy="Check the syntax near that place.") from None
-
-
-def read_bytes(path: str | Path, what: str, remedy: str) -> bytes:
-    """A file's bytes.  Raises BadInput where there is none."""
-    try:
-        return Path(path).read_bytes()
-    except OSError as why:
-        raise BadInput(f"there is no such {what} ({why.strerror})", file=path, remedy=remedy) from None
+        return tomllib.loads(source.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as why:  # syntax, encoding, a number of 5000 digits, a thousand brackets
+        said = "nested too deeply" if isinstance(why, RecursionError) else str(why)[:200]
+        raise BadInput(f"not a TOML file ({said})", file=file, remedy="Check the syntax near that place.") from None
 
 
 def validated(model: type[Model], table: dict, file: object, remedy: str) -> Model:
     """``table`` as a ``model``.  Raises BadInput for unknown keys, wrong units and impossible values."""
-    try:
-        return model.model_validate(table)
-    except BadInput as why:
-        raise BadInput(why.what, file=file, channel=why.channel, remedy=why.remedy) from None
-    except ValidationError as why:
-        raise BadInput(_in_words(why, model), file=file, remedy=remedy) from None
+    with reading(file, remedy):
+        try:
+            return model.model_validate(table)
+        except BadInput as why:
+            raise BadInput(why.what, file=file, channel=why.channel, remedy=why.remedy) from None
+        except ValidationError as why:
+            raise BadInput(_in_words(why, model), file=file, remedy=remedy) from None
 
 
 def _in_words(why: ValidationError, model: type[BaseModel]) -> str:

@@ -13,13 +13,14 @@ def compiled(function):
         dispatcher = njit(cache=True)(function)
     except RuntimeError:  # no folder for the cache may be written
         return njit(function)
-    if getattr(dispatcher, "_cache", None) is not None:  # not where NUMBA_DISABLE_JIT leaves the function
-        dispatcher._cache = _forgiving(dispatcher._cache)
+    cache = getattr(dispatcher, "_cache", None)
+    if cache is not None:  # there is none where NUMBA_DISABLE_JIT leaves the function
+        _forgive(cache)
     return dispatcher
 
 
-def _forgiving(cache):
-    """The cache; what cannot be read from it counts as missing, and what cannot be kept is compiled again next time."""
+def _forgive(cache) -> None:
+    """What cannot be read from the cache counts as missing, and what cannot be kept is compiled again next time."""
     load, save = cache.load_overload, cache.save_overload
 
     def load_overload(signature, target):
@@ -35,4 +36,3 @@ def _forgiving(cache):
             save(signature, data)
 
     cache.load_overload, cache.save_overload = load_overload, save_overload
-    return cache

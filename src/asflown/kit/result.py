@@ -216,13 +216,13 @@ class Estimate:
         """Comment lines, a heading with units, and rows; blank where unknown.  No partial file remains."""
         series = self._needed_series()
         columns = _flat(series)
-        lines = self._head_lines(f"{type(self).__name__}; craft {self.craft}; {self.method}, {self.variant}")
+        lines = self._comments(f"{type(self).__name__}; craft {self.craft}; {self.method}, {self.variant}")
         lines.append(",".join(["time_s", *columns]))
         rows = zip(series.time_s, *columns.values(), strict=True)
         lines.extend(",".join("" if v != v else repr(float(v)) for v in row) for row in rows)
         write_text(path, "\n".join(lines) + "\n")
 
-    def _head_lines(self, what: str) -> list[str]:
+    def _comments(self, what: str) -> list[str]:
         """Comment lines above a saved table: epoch, what it is, doubts, provenance."""
         remarks = [
             f"epoch: {self.epoch}",

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..kit.config import read_bytes
 from ..kit.errors import BadInput, some_of
 from ..kit.files import sha256_of
+from ..kit.reading import read_bytes, reading
 from ..kit.result import Input
 from .columns import Columns, read_table
 from .frame import SMALLEST, tvc_axes
@@ -30,7 +30,7 @@ def load_plan(path) -> Plan:
     """Read planned burns: CSV, Parquet or TOML ([[maneuver]]) with ``id`` and either ``dv`` or ``expected_dv_x, _y, _z`` and
     ``craft_x_x, _y, _z``.  Raises BadInput, naming file, line and column, for anything it cannot read."""
     path = Path(path)
-    try:
+    with reading(path, "docs/maneuvers.md lists the columns."):
         data = read_bytes(path, "table of burns", "Give a CSV, Parquet or TOML file.")
         columns = Columns(read_table(path, data))
         columns.need("id")
@@ -51,6 +51,4 @@ def load_plan(path) -> Plan:
             dv = columns.numbers("dv")
         for row in np.flatnonzero(dv < SMALLEST)[:1]:
             raise columns.wrong(int(row), "dv", f"{dv[row]:g} m/s is not the size of a burn", "A dV is positive.")
-    except BadInput as why:
-        raise why.within(path) from None
     return Plan(ids, dv, axes, (Input(str(path), sha256_of(data)),))

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from ..kit.config import read_bytes
 from ..kit.doubts import Doubt, Doubts, Kind, Severity
 from ..kit.errors import BadInput, some_of
 from ..kit.files import sha256_of
+from ..kit.reading import read_bytes, reading
 from ..kit.result import Input, inputs_of
 from .adjust import SCALE, Adjustment, Ledger, entered, scale_corrected
 from .columns import Columns, read_table
@@ -186,7 +186,7 @@ def load_maneuvers(path, *, columns=None) -> Maneuvers:
     """
     of_file = isinstance(path, (str, Path))
     name = str(path) if of_file else type(path).__name__
-    try:
+    with reading(name, "docs/maneuvers.md lists the columns."):
         if of_file:
             data = read_bytes(path, "maneuver table", "Give a CSV, Parquet, Excel or TOML file.")
             table, digest = read_table(Path(path), data), sha256_of(data)
@@ -210,8 +210,6 @@ def load_maneuvers(path, *, columns=None) -> Maneuvers:
         found = replace(found, source=name, inputs=(Input(name, digest), *inputs_of(columns)), excluded=excluded)
         found = _one_spelling(_in_order(found))
         return replace(found, doubts=found.doubts + Doubts(implausible(found)))
-    except BadInput as why:
-        raise why.within(name) from None
 
 
 def _ids(columns: Columns) -> tuple[str, ...]:

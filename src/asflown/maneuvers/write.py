@@ -34,7 +34,7 @@ def write_maneuvers(m: Maneuvers, path: str | Path) -> None:
     BadInput
         Where the place cannot be written.
     """
-    write_text(path, maneuver_text(m))
+    write_text(path, f"{maneuver_text(m)}# {mark(MANEUVERS)}\n")
 
 
 def maneuver_text(m: Maneuvers) -> str:
@@ -57,7 +57,6 @@ def maneuver_text(m: Maneuvers) -> str:
     if any(m.ledger):
         columns["adjusted"] = ["; ".join(a.name for a in book) for book in m.ledger]
     text = io.StringIO()
-    text.write(f"# {mark(MANEUVERS)}\n")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
     writer.writerows(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..kit.errors import BadInput
 from ..kit.quantities import si_factor
+from ..kit.reading import csv_rows, plain_number, read_text
 from ..telemetry.channels import AXES, split_header
 
 if TYPE_CHECKING:
@@ -22,11 +22,8 @@ def read_table(path: Path, what: str, unit: str) -> tuple[np.ndarray, np.ndarray
     remedy = (
         f"Write a CSV with the header time [s],x [{unit}],y [{unit}],z [{unit}] (any of the axes) and increasing times."
     )
-    try:
-        with open(path, newline="", encoding="utf-8") as file:
-            rows = [r for r in csv.reader(file) if r and not r[0].lstrip().startswith("#")]
-    except (OSError, UnicodeDecodeError) as why:
-        raise BadInput(f"this {what} table cannot be read ({why})", file=path, remedy=remedy) from why
+    numbered = csv_rows(read_text(path, f"{what} table", remedy), path, remedy)
+    rows = [row for _, row in numbered]
     split = [split_header(cell) for cell in rows[0]] if rows else []
     heads = [head for head in split if head is not None]
     if (
@@ -37,10 +34,10 @@ def read_table(path: Path, what: str, unit: str) -> tuple[np.ndarray, np.ndarray
     ):
         raise BadInput(f"the header of this {what} table is not understood", file=path, remedy=remedy)
     try:
-        values = np.array([[float(cell) for cell in row] for row in rows[1:]])
+        values = np.array([[plain_number(cell) for cell in row] for row in rows[1:]])
     except ValueError as why:
         raise BadInput(f"a row of this {what} table is not all numbers ({why})", file=path, remedy=remedy) from why
-    if values.ndim != 2 or len(values) < 2 or values.shape[1] != len(heads) or not np.isfinite(values).all():
+    if values.ndim != 2 or len(values) < 2 or values.shape[1] != len(heads) or not (np.abs(values) < 1e60).all():
         raise BadInput(f"the rows of this {what} table do not match its header", file=path, remedy=remedy)
     times = values[:, 0] * si_factor(heads[0][1], "s")
     if np.any(np.diff(times) <= 0):

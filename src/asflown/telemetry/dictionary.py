@@ -31,9 +31,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from ..kit.config import read_bytes, toml_table, validated
+from ..kit.config import toml_table, validated
 from ..kit.errors import BadInput, some_of
 from ..kit.quantities import is_unit, quantity, si_factor
+from ..kit.reading import read_bytes, reading
 from ..kit.rotations import euler, lvlh_to_inertial, quaternion, rotation
 from ..kit.timeline import NS
 from .assemble import Clock, Part, Read, Use, assembled
@@ -168,10 +169,8 @@ def load_dictionary(path) -> ChannelDictionary:
     else:
         source = read_bytes(path, "channel dictionary", "Give a TOML file; examples/ holds some.")
         entry = validated(ChannelDictionary, toml_table(source, path), path, remedy)
-    try:
+    with reading(path, remedy):
         _check(entry)
-    except BadInput as why:
-        raise BadInput(why.what, remedy=why.remedy, file=path, channel=why.channel) from None
     return entry
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from datetime import date, datetime, timedelta
 from typing import TYPE_CHECKING, Any
+from zipfile import ZipFile
 
 import numpy as np
 
 from ..kit.errors import BadInput, some_of
+from ..kit.reading import limit
 from ..kit.timeline import utc_to_posix_ns
 from .channels import member_names
 from .tables import Table, checked, quiet_database, quoted_pattern, said, typed
@@ -20,7 +23,11 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 #: Numbers in one file that are unpacked into memory at most.
-LARGEST_CELLS = 400_000_000
+LARGEST_CELLS = limit("CELLS", 400_000_000)
+#: A file that declares more times its own size than any packing gives, and more than this, is damaged or a trap. [bytes]
+_PACKING, _SUSPICIOUS = 1100, 64_000_000
+#: A workbook is unpacked up to this size: its cells take thirty times as much in Python. [bytes]
+LARGEST_WORKBOOK = limit("WORKBOOK_BYTES", 100_000_000)
 #: Calendars of CF that count as UTC without leap seconds, as xarray and netCDF4 write them; 'utc' counts SI seconds.
 _CALENDARS = ("standard", "gregorian", "proleptic_gregorian", "utc")
 #: Attributes that declare a fill value, and the ends of the valid range.
@@ -48,15 +55,19 @@ def needed(package: str, extra: str, kind: str) -> BadInput:
 
 def read_parquet(path: Path) -> Table:
     """A Parquet file whose column names are header cells; ``epoch`` among its key-value metadata."""
-    import duckdb
 
     place = quoted_pattern(path)
     try:
         with quiet_database() as db:
             db.execute("SET TimeZone = 'UTC'")
+            rows = db.execute("SELECT max(num_rows) FROM parquet_file_metadata(?)", [place]).fetchone()[0]
+            columns = db.execute("SELECT count(*) FROM parquet_schema(?)", [place]).fetchone()[0]
+            _check_size(rows * columns, path)
             found = db.execute("SELECT * FROM read_parquet(?, hive_partitioning = false)", [place]).fetchnumpy()
             notes = db.execute("SELECT key, value FROM parquet_kv_metadata(?)", [place]).fetchall()
-    except duckdb.Error as why:
+    except BadInput:
+        raise
+    except Exception as why:  # of DuckDB, and of Arrow's types that numpy lacks
         raise damaged("Parquet", why) from None
     epoch = next((v for k, v in notes if said(k).strip().lower() == "epoch"), None)
     return checked(
@@ -113,7 +124,7 @@ def _groups(path: Path, xarray) -> list:
             for name in names:
                 at = {} if name is None else {"group": name}
                 with xarray.open_dataset(path, decode_times=False, **how, **at) as opened:
-                    _check_size(sum(int(np.prod(v.shape)) for v in opened.variables.values()))
+                    _check_size(sum(math.prod(v.shape) for v in opened.variables.values()), path)
                     found.append(opened.load())
     except ImportError as why:
         raise BadInput(
@@ -136,11 +147,18 @@ def _group_names(path: Path) -> list[str]:
     return names
 
 
-def _check_size(cells: int) -> None:
+def _check_size(cells: int, path: Path) -> None:
+    """Raise BadInput before more is unpacked than may be, or than the file can hold."""
     if cells > LARGEST_CELLS:
         raise BadInput(
             f"the file declares {cells:.3g} numbers, more than {LARGEST_CELLS:.3g}",
-            remedy="Divide the file, or keep only the variables that are needed.",
+            remedy="Divide the file, keep only the variables that are needed, or set ASFLOWN_MAX_CELLS.",
+        )
+    size = path.stat().st_size
+    if 8 * cells > max(_PACKING * size, _SUSPICIOUS):
+        raise BadInput(
+            f"the file declares {cells:.3g} numbers and has {size / 1e3:.0f} kB, too little to hold them",
+            remedy="Copy the file again, or write it anew.",
         )
 
 
@@ -260,7 +278,11 @@ def read_fits(path: Path) -> list[Table]:
             warnings.simplefilter("ignore")
             with fits.open(path, memmap=False) as file:
                 for part in file:
-                    if isinstance(part, (fits.BinTableHDU, fits.TableHDU)) and len(part.data):
+                    if not isinstance(part, (fits.BinTableHDU, fits.TableHDU)):
+                        continue
+                    if part.header["NAXIS1"] * part.header["NAXIS2"] > path.stat().st_size:
+                        raise BadInput("the file is shorter than its table", remedy="Copy the file again.")
+                    if len(part.data):
                         columns = [(c.name, c.unit, np.asarray(part.data[c.name]), c.null) for c in part.columns]
                         tables.append(_from_arrays(columns, part.header.get("EPOCH") or part.header.get("DATEREF")))
     except BadInput:
@@ -302,11 +324,14 @@ def read_cdf(path: Path) -> list[Table]:
         file = cdflib.CDF(str(path))
         names = list(file.cdf_info().zVariables) + list(file.cdf_info().rVariables)
         by_clock: dict[str, list] = {}
+        cells = 0
         for name in names:
             attributes = file.varattsget(name)
             if clock := attributes.get("DEPEND_0"):
+                about = file.varinq(name)
+                cells += (about.Last_Rec + 1) * math.prod(about.Dim_Sizes or [1])
+                _check_size(cells, path)
                 values = np.asarray(file.varget(name))
-                _check_size(values.size)
                 by_clock.setdefault(clock, []).append((name, attributes, values))
         clocks = {clock: cdflib.cdfepoch.to_datetime(file.varget(clock)) for clock in by_clock}
     except BadInput:
@@ -337,10 +362,13 @@ def read_cdf(path: Path) -> list[Table]:
 
 def read_matlab(path: Path) -> list[Table]:
     """A MATLAB file of version 5: vectors and matrices of one length as columns; version 7.3 is HDF5."""
-    from scipy.io import loadmat
+    from scipy.io import loadmat, whosmat
 
     try:
+        _check_size(sum(math.prod(shape) for _, shape, _ in whosmat(path)), path)
         found = loadmat(path, squeeze_me=True, struct_as_record=False)
+    except BadInput:
+        raise
     except Exception as why:  # scipy raises many kinds for damaged files
         raise damaged("MATLAB", why) from None
     arrays: dict[str, np.ndarray] = {}
@@ -362,7 +390,7 @@ def read_matlab73(path: Path) -> list[Table]:
 
     def keep(name: str, item) -> None:
         if isinstance(item, h5py.Dataset) and not name.startswith("#") and item.dtype.kind in "iuf":
-            _check_size(item.size)
+            _check_size(item.size + sum(v.size for v in arrays.values()), path)
             arrays[name.rpartition("/")[2]] = np.squeeze(item[()])
 
     try:
@@ -398,6 +426,13 @@ def read_excel(path: Path) -> list[Table]:
     except ImportError:
         raise needed("openpyxl", "files", "Excel") from None
     try:
+        with ZipFile(path) as packed:
+            size = sum(part.file_size for part in packed.infolist())
+        if size > LARGEST_WORKBOOK:
+            raise BadInput(
+                f"the workbook unpacks to {size / 1e6:.0f} MB, more than {LARGEST_WORKBOOK / 1e6:g} MB",
+                remedy="Save the table as CSV or Parquet, or set ASFLOWN_MAX_WORKBOOK_BYTES.",
+            )
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             book = openpyxl.load_workbook(path, read_only=True, data_only=True)
@@ -405,6 +440,8 @@ def read_excel(path: Path) -> list[Table]:
                 s.title: [[_cell(c) for c in row] for row in s.iter_rows(values_only=True)] for s in book.worksheets
             }
             book.close()
+    except BadInput:
+        raise
     except Exception as why:  # openpyxl raises many kinds for damaged files
         raise damaged("Excel", why) from None
     for title, sheet in sheets.items():

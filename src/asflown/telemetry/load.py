@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..kit.errors import BadInput, some_of
 from ..kit.files import sha256_of_file
+from ..kit.reading import read_bytes, reading
 from ..kit.result import Input, inputs_of
 from .assemble import Clock, Part, Read, Use, assembled, time_column
 from .channels import kind_of, split_header, to_si
@@ -56,7 +57,7 @@ def load_telemetry(path, *, channels=None, exclude=None, craft=None) -> Telemetr
     of_file = isinstance(path, (str, Path))
     path = Path(path) if of_file else path
     name = str(path) if of_file else type(path).__name__
-    try:
+    with reading(name, "Check the file, or its channel dictionary (docs/telemetry.md)."):
         if of_file:
             tables, digest = _tables(path), sha256_of_file(path)
         else:
@@ -82,8 +83,6 @@ def load_telemetry(path, *, channels=None, exclude=None, craft=None) -> Telemetr
             findings=tuple(read.findings),
         )
         telemetry = check_attitude(screen(telemetry, craft), read.readings)
-    except BadInput as why:
-        raise why.within(name) from why.__cause__
     if exclude is None:
         return telemetry
     spans = read_exclusions(exclude, telemetry)
@@ -185,9 +184,9 @@ def read_exclusions(path, telemetry: Telemetry) -> list[Exclusion]:
 
     Raises BadInput for a missing column, a span that ends before it starts, or one without a reason."""
     path = Path(path)
-    try:
+    with reading(path, "Write a CSV of start,stop,channel,reason."):
         _check_plain(path)
-        table = read_csv(path.read_bytes())
+        table = read_csv(read_bytes(path, "exclusion file", "Check the path."))
         names = [h.strip().lower() for h in table.headings]
         missing = [n for n in ("start", "stop", "channel", "reason") if n not in names]
         if missing:
@@ -208,6 +207,4 @@ def read_exclusions(path, telemetry: Telemetry) -> list[Exclusion]:
                     what, line=table.line(row), remedy="Every exclusion needs a start, a later stop and a reason."
                 )
             found.append(Exclusion(entry["channel"] or "*", start, stop, entry["reason"]))
-    except BadInput as why:
-        raise why.within(path) from None
     return found

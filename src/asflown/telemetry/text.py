@@ -22,6 +22,7 @@ import numpy as np
 
 from ..kit.errors import BadInput
 from ..kit.quantities import is_unit
+from ..kit.reading import limit
 from ..kit.timeline import posix_to_tai_ns
 from .channels import split_header
 from .tables import Table, check_headings, checked, quiet_database, quoted_pattern, typed
@@ -38,11 +39,11 @@ _BLANKS = {" ": "blanks"}
 #: Lines looked at to tell how the table is written, and the most bytes they may take.
 _HEAD_LINES, _HEAD_BYTES = 200, 1 << 20
 #: Text beyond this is not read cell by cell in Python. [bytes]
-SLOW_LIMIT = 200_000_000
+SLOW_LIMIT = limit("SLOW_BYTES", 200_000_000)
 #: Text up to this is read cell by cell at once: DuckDB takes longer to load. [bytes]
 SMALL = 500_000
 #: A packed table is unpacked up to this size. [bytes]
-UNPACKED_LIMIT = 8_000_000_000
+UNPACKED_LIMIT = limit("UNPACKED_BYTES", 8_000_000_000)
 _NUMBER = re.compile(
     r"[+-]?(?:\d{1,400}(?:[.,]\d{0,400})?|[.,]\d{1,400})(?:[eE][+-]?\d{1,5})?|nan|[+-]?inf(?:inity)?",
     re.IGNORECASE | re.ASCII,
@@ -101,7 +102,7 @@ def _unpacked(packed) -> Iterable[bytes]:
                 if total > UNPACKED_LIMIT:
                     raise BadInput(
                         f"the gzip file unpacks to more than {UNPACKED_LIMIT / 1e9:g} GB",
-                        remedy="Unpack it and divide the table, or write Parquet.",
+                        remedy="Unpack it and divide the table, write Parquet, or set ASFLOWN_MAX_UNPACKED_BYTES.",
                     )
                 if b"\0" in block:
                     raise _not_text("the file contains zero bytes (NUL)")
@@ -381,7 +382,7 @@ class TextFile:
             raise BadInput(
                 f"the table ({size / 1e6:.0f} MB) is too large to be read cell by cell, as its form requires "
                 "(quotation marks, comments or blank lines among the rows, or a cell that is not a number)",
-                remedy="Write it without them, or as Parquet.",
+                remedy="Write it without them, or as Parquet; or set ASFLOWN_MAX_SLOW_BYTES.",
             )
         return _cell_by_cell(_decoded(self.path.read_bytes()), self.form)
 

@@ -16,6 +16,7 @@ import numpy as np
 from ..kit.errors import BadInput
 from ..kit.files import sha256_of
 from ..kit.quantities import si_factor
+from ..kit.reading import read_bytes, reading
 from .assemble import origin_of, time_column
 from .channels import AXES, split_header
 from .tables import Table, numbers_of, times_of
@@ -42,17 +43,12 @@ class TrajectoryTable:
 
 def load_trajectory(path: str | Path) -> TrajectoryTable:
     """Raises BadInput, naming file, line or column, for a table of another form or one that contradicts itself."""
-    try:
+    with reading(path, "Write it as docs/cli.md says under density."):
         return _read(Path(path))
-    except BadInput as why:
-        raise why.within(path) from None
 
 
 def _read(path: Path) -> TrajectoryTable:
-    try:
-        data = path.read_bytes()
-    except OSError as why:
-        raise BadInput(f"the trajectory cannot be read ({why.strerror})", remedy="Check the path.") from None
+    data = read_bytes(path, "trajectory", "Check the path.")
     table = read_csv(data)
     at, scale = time_column(table)
     origin = origin_of(table.epoch)

@@ -17,8 +17,8 @@ from .options import ENGINE, maneuvers_from, past_named
 if TYPE_CHECKING:
     from ...estimate.gates import GatesPredictionResult
 
-#: What the table of samples calls itself (see ``kit.files.is_ours``).
-SAMPLES = "samples"
+#: Heading of the table of samples, by which such a table is known.
+_HEADING = "id,sample,error_x [m/s],error_y [m/s],error_z [m/s]"
 
 
 @verb
@@ -51,7 +51,7 @@ def predict(
         raise BadInput("--samples and --out go together", remedy="Give --samples N --out FILE.csv.")
     job = Job(context)
     if table is not None:
-        job.may_write(table, SAMPLES)
+        job.may_write(table, "samples", ours=_is_samples(table))
     burns = load_plan(plan)
     source = past_named(by, engine) if past is None else gates(maneuvers_from(past, engine), model=model)
     result = replace(gates_prediction(burns, source), seed=seed if samples else None)
@@ -61,19 +61,25 @@ def predict(
     job.finish(result, inputs=inputs_of(by))
 
 
+def _is_samples(table: Path) -> bool:
+    if not table.is_file():
+        return False
+    with table.open("rb") as file:
+        return file.readline(200).decode("utf-8", "replace").rstrip() == _HEADING
+
+
 def _write_samples(result: GatesPredictionResult, count: int, seed: int, table: Path) -> None:
     import csv
     import io
 
     import numpy as np
 
-    from ...kit.files import mark, write_text
+    from ...kit.files import write_text
 
     rng = np.random.default_rng(seed)
     text = io.StringIO()
-    text.write(f"# {mark(SAMPLES)}\n")
+    text.write(f"{_HEADING}\n")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["id", "sample", "error_x [m/s]", "error_y [m/s]", "error_z [m/s]"])
     for b in result.burns:
         writer.writerows([b.id, k + 1, *map(repr, row)] for k, row in enumerate(b.samples(count, rng).tolist()))
     write_text(table, text.getvalue())

@@ -6,7 +6,6 @@ time, the arm as a vector: then one density explains the torque about all axes a
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +16,7 @@ from ...dynamics.drag import PRINTED_E3, torque_per_density
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput, check_choice
 from ...kit.quantities import si_factor
+from ...kit.reading import csv_rows, plain_number, read_text
 from ...telemetry.channels import AXES, split_header
 from .expected import size_doubts
 
@@ -240,11 +240,7 @@ def _table_doubts(t, speed, k, flyby: Flyby) -> list[Doubt]:
 
 def _read(path: Path) -> dict[str, np.ndarray]:
     """Columns of a drag table in SI.  Raises BadInput naming file and line."""
-    try:
-        with open(path, newline="", encoding="utf-8") as file:
-            rows = [(n, r) for n, r in enumerate(csv.reader(file), start=1) if r and not r[0].lstrip().startswith("#")]
-    except (OSError, UnicodeDecodeError) as why:
-        raise BadInput(f"this drag table cannot be read ({why})", file=path, remedy=_REMEDY) from why
+    rows = csv_rows(read_text(path, "drag table", _REMEDY), path, _REMEDY)
     heads = [split_header(cell.strip()) for cell in rows[0][1]] if rows else []
     known = [h for h in heads if h is not None and h[0] in _UNITS]
     names = [h[0] for h in known]
@@ -255,11 +251,11 @@ def _read(path: Path) -> dict[str, np.ndarray]:
     values = []
     for number, row in rows[1:]:
         try:
-            values.append([float(cell) for cell in row])
+            values.append([plain_number(cell) for cell in row])
         except ValueError:
             values.append([])
-        if len(values[-1]) != len(names) or not np.isfinite(values[-1]).all():
-            raise BadInput(f"line {number} of this drag table does not match its header", file=path, remedy=_REMEDY)
+        if len(values[-1]) != len(names) or not (np.abs(values[-1]) < 1e60).all():
+            raise BadInput("this row does not match its header", file=path, line=number, remedy=_REMEDY)
     found = {
         n: np.array(v) * si_factor(unit, _UNITS[n])
         for (n, unit), v in zip(known, zip(*values, strict=True), strict=True)

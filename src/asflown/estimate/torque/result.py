@@ -339,7 +339,7 @@ class TorqueResult(Estimate):
         columns = [("time [s]", self.time_s)]
         columns += [(f"{n}{suffix}_{AXES[j]} [{u}]", v[:, j]) for n, v, u in named if v is not None for j in self.axes]
         what = f"disturbance torque on the body, body axes; craft {self.craft}; {self.method}, {self.variant}"
-        lines = [*self._head_lines(what), ",".join(name for name, _ in columns)]
+        lines = [*self._comments(what), ",".join(name for name, _ in columns)]
         rows = zip(*(v for _, v in columns), strict=True)
         lines += [",".join(repr(float(v)) if np.isfinite(v) else "" for v in row) for row in rows]
         write_text(path, "\n".join(lines) + "\n")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
+import math
 import re
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...kit.errors import BadInput, some_of
+from ...kit.reading import csv_rows, plain_number, read_text
 from ...kit.timeline import utc_to_tai_ns
 
 if TYPE_CHECKING:
@@ -58,10 +58,9 @@ class NamedRunDown:
 
 def _is_number(text: str | float) -> bool:
     try:
-        float(text)
+        return math.isfinite(plain_number(text) if isinstance(text, str) else text)
     except ValueError:
         return False
-    return True
 
 
 def named_run_downs(words: Iterable[str | NamedRunDown]) -> tuple[NamedRunDown, ...]:
@@ -94,15 +93,11 @@ def _one(word: str) -> NamedRunDown:
 
 def _listed(path: str) -> list[NamedRunDown]:
     """Rows of a CSV file; times are seconds from the epoch or UTC."""
-    if not Path(path).is_file():
-        raise BadInput("this list of run-downs does not exist", file=path, remedy=_FORMS)
-    try:
-        with Path(path).open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.DictReader(file, skipinitialspace=True))
-    except (UnicodeDecodeError, csv.Error) as why:
-        raise BadInput(f"this list of run-downs cannot be read ({why})", file=path, remedy=_FORMS) from why
+    rows = csv_rows(read_text(path, "list of run-downs", _FORMS), path, _FORMS)
+    heads = [h.strip() for h in rows[0][1]] if rows else []
     found = []
-    for number, row in enumerate(rows, start=2):
+    for number, cells in rows[1:]:
+        row = dict(zip(heads, cells, strict=False))
         wheel, start, stop = ((row.get(n) or "").strip() for n in ("wheel", "start", "stop"))
         if not (wheel and start and stop):
             raise BadInput("a run-down lacks its wheel, start or stop", file=path, line=number, remedy=_FORMS)

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Literal
@@ -14,7 +13,9 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from ...craft.model import Kilogram, NewtonMetre, RadianPerSecond, Second, _in
+from ...kit.config import toml_table
 from ...kit.errors import BadInput, some_of
+from ...kit.reading import read_bytes
 from ...kit.timeline import NS, utc_to_tai_ns
 from ..plans import Part, Plan, shipped
 from ..scenario import NoiseName
@@ -184,8 +185,8 @@ def is_mission(name_or_path: str | Path) -> bool:
     if path.suffix != ".toml" or not path.is_file():
         return False
     try:
-        return "events" in tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return "events" in toml_table(read_bytes(path, "mission file", ""), path)
+    except BadInput:
         return False  # the scenario's door says what is wrong with it
 
 

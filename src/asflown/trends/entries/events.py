@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +10,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from ...kit.config import read_bytes, toml_table, validated
+from ...kit.config import toml_table, validated
 from ...kit.errors import BadInput, some_of
+from ...kit.reading import csv_rows, plain_number, read_bytes, read_text
 from ...kit.timeline import NS, utc_label, utc_to_tai_ns
 
 if TYPE_CHECKING:
@@ -78,8 +77,11 @@ def load_events(path: str | Path) -> list[Event]:
     Raises BadInput for an unreadable list, unknown keys, a repeated id, an event with neither file nor date, times
     out of order, and files that do not exist: a list with an error is not analysed at all."""
     path = Path(path)
-    source = read_bytes(path, "event list", "Give an event list (TOML or CSV). " + _REMEDY)
-    table = {"event": _csv_rows(source, path)} if path.suffix.lower() == ".csv" else toml_table(source, path)
+    what = "event list", "Give an event list (TOML or CSV). " + _REMEDY
+    if path.suffix.lower() == ".csv":
+        table: dict = {"event": _csv_rows(read_text(path, *what), path)}
+    else:
+        table = toml_table(read_bytes(path, *what), path)
     rows = validated(_List, table, path, _REMEDY).event
     seen: set[str] = set()
     for row in rows:
@@ -101,23 +103,22 @@ def is_event_list(path: str | Path) -> bool:
     return {b"id", b"kind"} <= {cell.strip() for cell in head.split(b",")}
 
 
-def _csv_rows(source: bytes, path: Path) -> list[dict]:
-    try:
-        text = source.decode("utf-8-sig")
-    except UnicodeDecodeError as why:
-        raise BadInput(f"not a text file ({why})", file=path, remedy=_REMEDY) from None
-    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+def _csv_rows(text: str, path: Path) -> list[dict]:
+    numbered = csv_rows(text, path, _REMEDY)
+    heads = [h.strip() for h in numbered[0][1]] if numbered else []
+    if twice := {h for h in heads if heads.count(h) > 1}:
+        raise BadInput(f"the header names a column twice: {some_of(sorted(twice))}", file=path, remedy=_REMEDY)
     rows = []
-    for number, raw in enumerate(csv.DictReader(io.StringIO("\n".join(lines))), start=2):
-        if None in raw or None in raw.values():
+    for number, cells in numbered[1:]:
+        if len(cells) != len(heads):
             raise BadInput(
                 "this row and the header differ in the number of cells", file=path, line=number, remedy=_REMEDY
             )
-        row: dict = {k.strip(): v.strip() for k, v in raw.items() if v.strip() != ""}
+        row: dict = {k: v.strip() for k, v in zip(heads, cells, strict=True) if v.strip() != ""}
         for name in ("motor_on_s", "motor_off_s", "start_s", "stop_s"):
             if name in row:
                 try:
-                    row[name] = float(row[name])
+                    row[name] = plain_number(row[name])
                 except ValueError:
                     raise BadInput(
                         f"{name} {row[name]!r} is not a number", file=path, line=number, remedy=_REMEDY
