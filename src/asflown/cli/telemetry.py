@@ -9,6 +9,7 @@ import typer
 
 from .options import CHANNELS, CM, EXCLUDE, INERTIA, JSON, START, STOP, craft_from, hashes
 from .output import print_doubts, print_json, provenance
+from .progress import shown
 
 app = typer.Typer(help=__doc__, rich_markup_mode=None)
 
@@ -38,7 +39,8 @@ def check(
     from ..telemetry.screening import needs_a_look, summaries
 
     ship = craft_from(craft, inertia, cm) if craft else None
-    t = load_telemetry(file, channels=channels, exclude=exclude, craft=ship).between(start, stop)
+    with shown():
+        t = load_telemetry(file, channels=channels, exclude=exclude, craft=ship).between(start, stop)
     look = needs_a_look(t)
     t = replace(t, doubts=t.doubts + sky_doubts(t, ship))
     lines = summaries(t)

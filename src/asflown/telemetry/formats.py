@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..kit.errors import BadInput, some_of
+from ..kit.progress import stage
 from ..kit.timeline import utc_to_posix_ns
 from .channels import member_names
-from .tables import Table, checked, quiet_database, quoted_pattern, said, typed
+from .tables import Table, checked, quiet_database, quoted_pattern, said, share_done, typed
 from .text import form_of_rows
 from .times import exact_ns, scale_called
 
@@ -52,7 +53,7 @@ def read_parquet(path: Path) -> Table:
 
     place = quoted_pattern(path)
     try:
-        with quiet_database() as db:
+        with quiet_database() as db, stage(f"reading {path.name}", lambda: share_done(db)):
             db.execute("SET TimeZone = 'UTC'")
             found = db.execute("SELECT * FROM read_parquet(?, hive_partitioning = false)", [place]).fetchnumpy()
             notes = db.execute("SELECT key, value FROM parquet_kv_metadata(?)", [place]).fetchall()
