@@ -33,6 +33,7 @@ slow: setup                ## the campaigns that .ci/run adds
 bench: setup               ## timings beside the peers, as ratios
 	$(BIN)/python benchmarks/torque_speed.py
 	$(BIN)/python benchmarks/door.py
+	$(BIN)/python benchmarks/startup.py
 	$(BIN)/python benchmarks/gates_bootstrap.py
 
 check: setup               ## style and types

@@ -20,6 +20,7 @@ import typer
 
 from .options import craft_from
 from .output import print_doubts, print_json, say
+from .progress import shown
 from .project import Defaults
 from .verb import WRITTEN, Asked, weighed
 
@@ -79,12 +80,13 @@ class Job:
         """Telemetry through the door, cut to the window; of the verb's ``file`` unless another is named."""
         from ..telemetry.load import load_telemetry
 
-        whole = load_telemetry(
-            file or self.given["file"],
-            channels=self.given.get("channels"),
-            exclude=self.given.get("exclude"),
-            craft=self.craft,
-        )
+        with shown():
+            whole = load_telemetry(
+                file or self.given["file"],
+                channels=self.given.get("channels"),
+                exclude=self.given.get("exclude"),
+                craft=self.craft,
+            )
         return whole.between(self.given.get("start"), self.given.get("stop"))
 
     @property

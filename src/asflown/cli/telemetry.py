@@ -9,6 +9,7 @@ import typer
 
 from .options import CHANNELS, CM, EXCLUDE, INERTIA, JSON, START, STOP, craft_from, hashes
 from .output import print_doubts, print_json, provenance
+from .progress import shown
 from .verb import verb, weighed
 
 app = typer.Typer(help=__doc__, rich_markup_mode=None)
@@ -40,7 +41,8 @@ def check(
     from ..telemetry.screening import needs_a_look, summaries
 
     ship = craft_from(craft, inertia, cm) if craft else None
-    t = load_telemetry(file, channels=channels, exclude=exclude, craft=ship).between(start, stop)
+    with shown():
+        t = load_telemetry(file, channels=channels, exclude=exclude, craft=ship).between(start, stop)
     look = needs_a_look(replace(t, doubts=weighed(t.doubts)))
     t = replace(t, doubts=weighed(t.doubts + sky_doubts(t, ship)))
     lines = summaries(t)

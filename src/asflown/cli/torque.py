@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from ..kit.progress import stage
 from .job import Job
 from .options import AIR, CHANNELS, CM, CRAFT, EXCLUDE, INERTIA, JSON, START, STOP, air_of, names_of
 from .output import say
+from .progress import shown
 from .verb import verb
 
 if TYPE_CHECKING:
@@ -65,8 +67,6 @@ def torque(
     json: bool = JSON,
 ) -> None:
     """Reconstruct the disturbance torque on the body from telemetry."""
-    from rich.console import Console
-
     from ..estimate.torque import method_called, torque_comparison
     from ..estimate.torque import torque as torque_by
 
@@ -85,8 +85,8 @@ def torque(
     if impulse is not None:  # before the work; the torque's own span may be shorter, and is asked again
         _span_of(impulse, *telemetry.seconds(telemetry.span()))
     mechanism = None if moving == "none" else moving
-    # seconds for an event, minutes for an orbit at 1 Hz: say that something happens, to a terminal only
-    with Console(stderr=True).status("fitting and smoothing", spinner="line"):
+    # seconds for an event, minutes for an orbit at 1 Hz: say that something happens
+    with shown(), stage("fitting and smoothing"):
         result = torque_by(
             telemetry,
             craft_then,

@@ -11,10 +11,11 @@ from zipfile import ZipFile
 import numpy as np
 
 from ..kit.errors import BadInput, some_of
+from ..kit.progress import stage
 from ..kit.reading import limit
 from ..kit.timeline import utc_to_posix_ns
 from .channels import member_names
-from .tables import Table, checked, quiet_database, quoted_pattern, said, typed
+from .tables import Table, checked, quiet_database, quoted_pattern, said, share_done, typed
 from .text import form_of_rows
 from .times import exact_ns, scale_called
 
@@ -58,7 +59,7 @@ def read_parquet(path: Path) -> Table:
 
     place = quoted_pattern(path)
     try:
-        with quiet_database() as db:
+        with quiet_database() as db, stage(f"reading {path.name}", lambda: share_done(db)):
             db.execute("SET TimeZone = 'UTC'")
             rows = db.execute("SELECT max(num_rows) FROM parquet_file_metadata(?)", [place]).fetchone()[0]
             columns = db.execute("SELECT count(*) FROM parquet_schema(?)", [place]).fetchone()[0]

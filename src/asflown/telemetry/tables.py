@@ -211,12 +211,17 @@ def _shown(cell: object) -> str:
 
 
 def quiet_database():
-    """DuckDB in memory, without its progress bar, which would be written among results."""
+    """DuckDB in memory, its progress counted and not written among results."""
     import duckdb
 
     db = duckdb.connect()
-    db.execute("SET enable_progress_bar = false")
+    db.execute("SET enable_progress_bar = true; SET enable_progress_bar_print = false")
     return db
+
+
+def share_done(db) -> float:
+    """How much of its query a database has done."""
+    return db.query_progress() / 100
 
 
 def quoted_pattern(path: Path) -> str:

@@ -21,11 +21,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kit.errors import BadInput
+from ..kit.progress import stage
 from ..kit.quantities import is_unit
 from ..kit.reading import limit
 from ..kit.timeline import posix_to_tai_ns
 from .channels import split_header
-from .tables import Table, check_headings, checked, quiet_database, quoted_pattern, typed
+from .tables import Table, check_headings, checked, quiet_database, quoted_pattern, share_done, typed
 from .times import DECIMALS, UNITS_NS, NotATime, exact_ns, is_stamp
 
 if TYPE_CHECKING:
@@ -439,7 +440,7 @@ def _selected(file: TextFile, chosen: list[str], types: dict[int, str]) -> dict[
         "auto_detect=false, header=false, strict_mode=true, null_padding=false, nullstr='', quote='', escape='', "
         f"compression='none', skip={file.form.first_line - 1}, delim=$delimiter, decimal_separator=$decimal, columns=$columns"
     )
-    with quiet_database() as db:
+    with quiet_database() as db, stage(f"reading {file.path.name}", lambda: share_done(db)):
         return db.execute(
             f"SELECT {', '.join(chosen)} FROM read_csv($path, {how})",
             {
