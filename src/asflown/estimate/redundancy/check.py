@@ -99,7 +99,7 @@ def _wheels(subject: Subject, motion: Motion, wrong: set[str]) -> list[Doubt]:
             return [_doubt(balance, better)]
         if k == 0 and balance.by == "law" and balance.own.share < FIRMLY:
             return []
-    return [*rates_unit(subject, motion, wrong), *rates_too_large(subject, motion)][:1]
+    return [*rates_unit(motion, wrong), *rates_too_large(subject, motion)][:1]
 
 
 def _laws(subject: Subject, motion: Motion, wrong: set[str]) -> Iterator[Balance]:

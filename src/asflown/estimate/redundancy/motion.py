@@ -6,6 +6,7 @@ is lost alike and the channels can be set against each other sample by sample.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -149,7 +150,7 @@ def _blocks(known: np.ndarray, shortest: int, longest: int) -> list[slice]:
         n = s.stop - s.start
         if n >= shortest:
             cuts = np.linspace(s.start, s.stop, -(-n // longest) + 1).astype(int)
-            found += [slice(int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+            found += [slice(int(a), int(b)) for a, b in itertools.pairwise(cuts)]
     if len(found) > _MOST_BLOCKS:
         found = [found[k] for k in np.linspace(0, len(found) - 1, _MOST_BLOCKS).astype(int)]
     return found
