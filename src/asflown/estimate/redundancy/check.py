@@ -33,7 +33,8 @@ def redundancy(subject: Subject) -> Doubts:
 
     Compared are body rates by gyro, attitude error and quaternion, about each axis; and what the wheels gain, against what the
     controller makes of that motion, or against what the body loses.  Nothing is said where the motion is too small to tell."""
-    doubts = [*noisy_axis(subject), *frozen(subject)]
+    # thrusters shake the axes that they turn, which is no noise
+    doubts = [*(() if subject.firing else noisy_axis(subject)), *frozen(subject)]
     motion = motion_of(subject)
     if motion is None:
         return Doubts(doubts)
