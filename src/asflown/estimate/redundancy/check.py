@@ -91,8 +91,8 @@ def _wheels(subject: Subject, motion: Motion, wrong: set[str]) -> list[Doubt]:
         seen = motion if width == HALF_WIDTHS_S[0] else motion_of(subject, width)
         tried += [] if seen is None else _laws(subject, seen, wrong)
         tried.sort(key=lambda b: b.told)
-        if tried and tried[0].own.share < FIRMLY:
-            break  # the wheels do what the law asks
+        if set(seen.rates if seen else ()) <= {GYRO} or (tried and tried[0].own.share < FIRMLY):
+            break  # wider smoothing is for sensors of attitude; or the wheels do what the law asks
     for k, balance in enumerate(tried):
         better = balance.better()
         # a size is told where the law holds best: noise that the controller answers to makes it another elsewhere
