@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -12,8 +12,6 @@ from ..kit.errors import BadInput
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from .table import Maneuvers
 
 #: A median error beyond this share of the dV is rather a wrong unit.
 _BEYOND_BELIEF = 0.3
@@ -108,7 +106,23 @@ def engine_turns(expected, craft_x, engines: tuple[str, ...]) -> Iterator[Doubt]
             yield ENGINE_TURNS(engine=engine or "the engine", low_deg=float(own.min()), high_deg=float(own.max()))
 
 
-def implausible(m: Maneuvers) -> Iterator[Doubt]:
+class Burns(Protocol):
+    """What is looked at, as ``Maneuvers`` holds it: N of each; SI, None where pointing is not known."""
+
+    def __len__(self) -> int: ...
+    @property
+    def dv_mps(self) -> np.ndarray: ...
+    @property
+    def magnitude_error_mps(self) -> np.ndarray: ...
+    @property
+    def sigma_magnitude_mps(self) -> np.ndarray: ...
+    @property
+    def pointing_error_mps(self) -> np.ndarray | None: ...
+    @property
+    def sigma_pointing_mps(self) -> np.ndarray: ...
+
+
+def implausible(m: Burns) -> Iterator[Doubt]:
     """Doubts of maneuvers, one engine or several together."""
     share = float(np.median(np.abs(m.magnitude_error_mps) / m.dv_mps))
     if share > _BEYOND_BELIEF:
@@ -122,7 +136,7 @@ def implausible(m: Maneuvers) -> Iterator[Doubt]:
     yield from _of_rows(m)
 
 
-def _of_pointing(m: Maneuvers) -> Iterator[Doubt]:
+def _of_pointing(m: Burns) -> Iterator[Doubt]:
     if m.pointing_error_mps is None:
         return
     across = np.linalg.norm(m.pointing_error_mps, axis=1)
@@ -135,9 +149,9 @@ def _of_pointing(m: Maneuvers) -> Iterator[Doubt]:
         yield PARTS_APART(ratio=sizes[0] / sizes[1])
 
 
-def _of_sigmas(m: Maneuvers) -> Iterator[Doubt]:
+def _of_sigmas(m: Burns) -> Iterator[Doubt]:
     sigmas = {"magnitude": m.sigma_magnitude_mps}
-    if m.pointing_covariance is not None:
+    if m.pointing_error_mps is not None:
         sigmas["pointing"] = m.sigma_pointing_mps
     for what, sigma in sigmas.items():
         median = float(np.median(sigma))
@@ -147,7 +161,7 @@ def _of_sigmas(m: Maneuvers) -> Iterator[Doubt]:
             yield COARSE_SIGMAS(what=what, sigma_mps=median)
 
 
-def _of_rows(m: Maneuvers) -> Iterator[Doubt]:
+def _of_rows(m: Burns) -> Iterator[Doubt]:
     """Rows that occur twice, to the last digit or rounded, and columns that do."""
     yield from _of_columns(m)
     rows = np.column_stack([m.dv_mps, m.magnitude_error_mps, m.sigma_magnitude_mps])
@@ -169,7 +183,7 @@ def _of_rows(m: Maneuvers) -> Iterator[Doubt]:
         yield REPEATED_ROWS(count=near, near=f" to {100 * _NEAR:g} %")
 
 
-def _of_columns(m: Maneuvers) -> Iterator[Doubt]:
+def _of_columns(m: Burns) -> Iterator[Doubt]:
     columns = {"dv": m.dv_mps, "magnitude_error": m.magnitude_error_mps}
     if m.pointing_error_mps is not None:
         columns |= {f"pointing_error_{a}": e for a, e in zip("xy", m.pointing_error_mps.T, strict=True)}

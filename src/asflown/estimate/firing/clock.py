@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -48,13 +48,13 @@ def check_clock(
     counter may be read.  Raises BadInput where that is more than a corrupt reading."""
     interval = np.diff(tai_ns) / NS
     late = step_s + _jitter(interval)
-    fast = used > (1 + _CLOCK) * interval[:, None] + late
-    if not fast.any():
-        return fast.any(axis=1), []
-    rows = np.flatnonzero(fast.any(axis=1))
+    fast = np.any(used > (1 + _CLOCK) * interval[:, None] + late, axis=1)
+    rows = np.flatnonzero(fast)
+    if not len(rows):
+        return fast, []
     k = int(rows[0])
     j = int(np.argmax(used[k]))
-    told = {
+    told: dict[str, Any] = {
         "thruster": names[j], "rise_s": float(used[k, j]), "interval_s": float(interval[k]),
         "time": tlm.describe_time(int(tai_ns[k + 1])), "count": len(rows),
     }  # fmt: skip
@@ -67,7 +67,7 @@ def check_clock(
             channel=f"on_time_{names[j]}",
             remedy=FASTER_THAN_CLOCK.remedy,
         )
-    return fast.any(axis=1), [FASTER_THAN_CLOCK(**told)]
+    return fast, [FASTER_THAN_CLOCK(**told)]
 
 
 def _jitter(interval_s: np.ndarray) -> float:

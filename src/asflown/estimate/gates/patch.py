@@ -188,10 +188,8 @@ def gates_patch(
 
 def _check_ledger(m: Maneuvers, at: int, burn: str) -> None:
     """Raises BadInput where an adjustment is listed for all burns before a patch and for none from it on: it is that patch."""
-    before, after = (
-        [{a.name for a in book if a.name != SCALE} for book in part] for part in (m.ledger[:at], m.ledger[at:])
-    )
-    done = set.intersection(*before) - set.union(*after)
+    books = [{a.name for a in book if a.name != SCALE} for book in m.ledger]
+    done = set.intersection(*books[:at]).difference(*books[at:])
     if done:
         raise BadInput(
             f"the adjustment {sorted(done)[0]!r} has been made already: it is listed for every burn before {burn} and for none from it on",

@@ -11,7 +11,6 @@ spin inertia of a wheel or of all, exchanges two wheels, or shifts the wheels in
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
@@ -26,6 +25,8 @@ from .motion import GYRO, NAMES
 from .rates import BETTER, LATE_S, LATE_STEPS, LATEST_S, SIGNIFICANT
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
     from ..subject import Subject
     from .motion import Motion
 
@@ -111,7 +112,7 @@ class Balance:
             size = max(np.sum(self.parts**2), np.sum(self.asked**2))
         else:
             size = np.sum(self.asked**2)
-        return replace(r, share=r.left / max(float(size), 1e-300))
+        return replace(r, share=r.left / float(size) if size > 0 else np.inf)
 
     def better(self) -> Reading | None:
         """The reading that fits far better than the file's own; None where there is none."""
@@ -119,7 +120,7 @@ class Balance:
         before = self._score(own, whole)
         tried = [(self._score(r, total), self._shared(r, total)) for r, total in self._readings()]
         tried = [(score, r) for score, r in tried if self._serves(r, own)]
-        if not tried:
+        if not tried or before == 0:
             return None
         least = min(score for score, _ in tried)
         family = next(

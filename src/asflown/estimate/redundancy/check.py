@@ -33,7 +33,8 @@ def redundancy(subject: Subject) -> Doubts:
 
     Compared are body rates by gyro, attitude error and quaternion, about each axis; and what the wheels gain, against what the
     controller makes of that motion, or against what the body loses.  Nothing is said where the motion is too small to tell."""
-    doubts = [*noisy_axis(subject), *frozen(subject)]
+    # thrusters shake the axes that they turn, which is no noise
+    doubts = [*(() if subject.firing else noisy_axis(subject)), *frozen(subject)]
     motion = motion_of(subject)
     if motion is None:
         return Doubts(doubts)
@@ -90,8 +91,8 @@ def _wheels(subject: Subject, motion: Motion, wrong: set[str]) -> list[Doubt]:
         seen = motion if width == HALF_WIDTHS_S[0] else motion_of(subject, width)
         tried += [] if seen is None else _laws(subject, seen, wrong)
         tried.sort(key=lambda b: b.told)
-        if tried and tried[0].own.share < FIRMLY:
-            break  # the wheels do what the law asks
+        if set(seen.rates if seen else ()) <= {GYRO} or (tried and tried[0].own.share < FIRMLY):
+            break  # wider smoothing is for sensors of attitude; or the wheels do what the law asks
     for k, balance in enumerate(tried):
         better = balance.better()
         # a size is told where the law holds best: noise that the controller answers to makes it another elsewhere
@@ -99,7 +100,7 @@ def _wheels(subject: Subject, motion: Motion, wrong: set[str]) -> list[Doubt]:
             return [_doubt(balance, better)]
         if k == 0 and balance.by == "law" and balance.own.share < FIRMLY:
             return []
-    return [*rates_unit(subject, motion, wrong), *rates_too_large(subject, motion)][:1]
+    return [*rates_unit(motion, wrong), *rates_too_large(subject, motion)][:1]
 
 
 def _laws(subject: Subject, motion: Motion, wrong: set[str]) -> Iterator[Balance]:

@@ -37,7 +37,7 @@ NO_LOOP = Kind(
 )  # fmt: skip
 
 
-def rates_unit(subject: Subject, motion: Motion, wrong: set[str]) -> list[Doubt]:
+def rates_unit(motion: Motion, wrong: set[str]) -> list[Doubt]:
     """Of a craft that turns steadily: its wheels' momentum turns with it, h' = -w x h, at another rate than the gyros say."""
     if GYRO not in motion.rates or GYRO in wrong or motion.stored is None:
         return []

@@ -6,6 +6,7 @@ is lost alike and the channels can be set against each other sample by sample.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -29,7 +30,7 @@ HALF_WIDTHS_S, _SAMPLES = (12.0, 40.0, 80.0), 3.5
 #: Motion slower than this is left out: biases of gyros, drag of wheels, the commanded turn of an orbit. [s], and half-widths
 _SLOW_S, _SLOW_WIDTHS = 300.0, 12.0
 #: A record is looked at in blocks, of at most so many such periods and at least so many half-widths; of a long one so many blocks.
-_BLOCK, _SHORTEST, _MOST_BLOCKS = 6.0, 6.0, 12
+_BLOCK, _SHORTEST, _MOST_BLOCKS = 6.0, 6.0, 6
 
 #: Where a body rate comes from.
 GYRO, ERROR, QUATERNION = "body_rate", "attitude_error", "quaternion"
@@ -76,14 +77,14 @@ def motion_of(subject: Subject, half_width_s: float = HALF_WIDTHS_S[0]) -> Motio
         grid = grid_for(channels)
         coarsest = max(c.usable.cadence_ns for c in channels) / NS
         width = max(half_width_s, _SAMPLES * coarsest)
-        smooth = {id(c): _smoothed(c.usable, grid, width) for c in channels}
     except BadInput:
         return None  # too short, or never at the same time
-    known = np.logical_and.reduce([np.isfinite(v) for v in smooth.values()])
+    known = np.logical_and.reduce([_covered(c.usable, grid, width) for c in channels])
     slow = max(_SLOW_S, _SLOW_WIDTHS * width)
     blocks = _blocks(known, round(_SHORTEST * width / grid.step_s), round(_BLOCK * slow / grid.step_s))
     if not blocks:
         return None
+    smooth = {id(c): _smoothed(c.usable, grid, width, blocks) for c in channels}
     rates, angles = {}, {}
     for name, axes in sources.items():
         seen = np.column_stack([smooth[id(axes[j])] if j in axes else np.full(grid.count, np.nan) for j in range(3)])
@@ -115,13 +116,23 @@ def _sources(subject: Subject) -> dict[str, dict[int, Channel]]:
     return {n: a for n, a in found.items() if a}
 
 
-def _smoothed(c: Channel, grid: Grid, half_width_s: float) -> np.ndarray:
-    """Values on the grid, NaN outside the channel's stretches that are long enough."""
-    t, at, out = grid.of(c.tai_ns), grid.seconds, np.full(grid.count, np.nan)
+def _covered(c: Channel, grid: Grid, half_width_s: float) -> np.ndarray:
+    """Whether an instant of the grid lies in a stretch of the channel that is long enough."""
+    t, at, out = grid.of(c.tai_ns), grid.seconds, np.zeros(grid.count, bool)
     for s in c.segments():
         if t[s][-1] - t[s][0] >= 2 * half_width_s:
-            inside = (at >= t[s][0] - 1e-9) & (at <= t[s][-1] + 1e-9)
-            out[inside] = local_polynomial(t[s], c.values[s], at[inside], degree=3, half_width=half_width_s).value
+            out |= (at >= t[s][0] - 1e-9) & (at <= t[s][-1] + 1e-9)
+    return out
+
+
+def _smoothed(c: Channel, grid: Grid, half_width_s: float, blocks) -> np.ndarray:
+    """Values on the grid, NaN outside the blocks."""
+    t, out = grid.of(c.tai_ns), np.full(grid.count, np.nan)
+    for b in blocks:
+        at = grid.step_s * np.arange(b.start, b.stop)
+        # a block lies in one stretch: beyond its reach no sample counts
+        s = slice(*np.searchsorted(t, [at[0] - 3 * half_width_s, at[-1] + 3 * half_width_s]))
+        out[b] = local_polynomial(t[s], c.values[s], at, degree=3, half_width=half_width_s).value
     return out
 
 
@@ -149,7 +160,7 @@ def _blocks(known: np.ndarray, shortest: int, longest: int) -> list[slice]:
         n = s.stop - s.start
         if n >= shortest:
             cuts = np.linspace(s.start, s.stop, -(-n // longest) + 1).astype(int)
-            found += [slice(int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+            found += [slice(int(a), int(b)) for a, b in itertools.pairwise(cuts)]
     if len(found) > _MOST_BLOCKS:
         found = [found[k] for k in np.linspace(0, len(found) - 1, _MOST_BLOCKS).astype(int)]
     return found

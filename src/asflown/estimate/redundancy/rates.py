@@ -60,7 +60,7 @@ NOISY_AXIS = Kind(
 )  # fmt: skip
 FROZEN = Kind(
     "redundancy.frozen", Severity.SUSPECT,
-    "{channel} keeps one value{where} while the other channels move: a sensor or a packet that is frozen",
+    "{channel} keeps one value throughout while the other channels move: a sensor or a packet that is frozen",
     "Exclude the span (--exclude), or leave the channel out.",
 )  # fmt: skip
 
@@ -90,12 +90,12 @@ class Compared:
 def compared(motion: Motion, sources: list[str]) -> list[Compared]:
     """Every pair of sources about every axis that both have."""
     quick = {n: motion.quick(motion.rates[n]) for n in sources}
-    found = []
-    for (a, x), (b, y) in combinations(quick.items(), 2):
-        for j in range(3):
-            if np.isfinite(x[:, j]).all() and np.isfinite(y[:, j]).all():
-                found.append(_pair(a, b, j, x[:, j], y[:, j]))
-    return found
+    return [
+        _pair(a, b, j, x[:, j], y[:, j])
+        for (a, x), (b, y) in combinations(quick.items(), 2)
+        for j in range(3)
+        if np.isfinite(x[:, j]).all() and np.isfinite(y[:, j]).all()
+    ]
 
 
 def _pair(a: str, b: str, j: int, x: np.ndarray, y: np.ndarray) -> Compared:
@@ -115,7 +115,7 @@ def _pair(a: str, b: str, j: int, x: np.ndarray, y: np.ndarray) -> Compared:
 def _worth(x: np.ndarray, y: np.ndarray) -> float:
     """Independent samples in the correlation of two series that do not see one motion (Bartlett 1946): both must be alike over a lag."""
     n, total = len(x), 1.0
-    a, b = x / np.sqrt(x @ x), y / np.sqrt(y @ y)
+    a, b = (v / max(np.sqrt(v @ v), 1e-300) for v in (x, y))
     for k in range(1, n // 4):
         both = float(a[:-k] @ a[k:]) * float(b[:-k] @ b[k:])
         if both < 2 / n:
@@ -171,12 +171,13 @@ def exchanged(motion: Motion, sources: list[str]) -> tuple[list[Doubt], set[str]
     doubts: list[Doubt] = []
     wrong: set[str] = set()
     for (a, x), (b, y) in combinations(quick.items(), 2):
-        r = np.nan_to_num(np.corrcoef(x.T, y.T)[:3, 3:])
+        sizes = np.outer(np.linalg.norm(x, axis=0), np.linalg.norm(y, axis=0))
+        r = x.T @ y / np.maximum(sizes, 1e-300)
         found = []
         for j in range(3):
             i = int(np.argmax(np.abs(r[:, j])))
             # of neither axis is its own the one that it moves as
-            own, other = min(1 - r[j, j] ** 2, 1 - r[i, i] ** 2), max(1 - r[i, j] ** 2, 1e-12)
+            own, other = max(min(1 - r[j, j] ** 2, 1 - r[i, i] ** 2), 1e-12), max(1 - r[i, j] ** 2, 1e-12)
             plain = i != j and own > BETTER * other
             if plain and 0.5 * _worth(x[:, i], y[:, j]) * np.log(own / other) > SIGNIFICANT:
                 found.append((i, j))
@@ -213,7 +214,7 @@ def lag(motion: Motion, x: np.ndarray, y: np.ndarray) -> float | None:
     shifts = np.arange(-most, most + 1)
     r = np.array([_correlation(x, y, k) for k in shifts])
     best = int(np.argmax(r))
-    own, left = 1 - max(r[most], 0.0) ** 2, max(1 - r[best] ** 2, 1e-12)
+    own, left = max(1 - max(r[most], 0.0) ** 2, 1e-12), max(1 - r[best] ** 2, 1e-12)
     late = float(shifts[best] * step)
     plain = own > BETTER * left and 0.5 * _worth(x, y) * np.log(own / left) > SIGNIFICANT
     return late if plain and abs(late) > max(LATE_S, LATE_STEPS * motion.cadence_s) else None
@@ -247,15 +248,14 @@ def noisy_axis(subject: Subject) -> list[Doubt]:
 
 
 def frozen(subject: Subject) -> list[Doubt]:
-    """Axes of a sensor that keep one value throughout while its other axes are noisy; a wheel that keeps its speed to the last digit."""
+    """Axes of a sensor, or wheels, that keep one value throughout while most of their kind are lively; a wheel may rest at zero."""
     tlm = subject.telemetry
     doubts = []
-    for stem, least in ((GYRO, 2), ("attitude_error", 2), ("wheel_rate", 2)):
+    for stem in (GYRO, ERROR, "wheel_rate"):
         family = [c.usable for c in tlm.channels.values() if c.kind.stem == stem and len(c.usable.values) >= _ENOUGH]
         dead = [c for c in family if (c.values == c.values[0]).all()]
         lively = [c for c in family if np.mean(np.diff(c.values) != 0) > _LIVELY]
-        resting = [c.name for c in dead if stem == "wheel_rate" and c.values[0] == 0]
-        for c in dead:
-            if len(lively) >= least - 1 and c.name not in resting:
-                doubts.append(FROZEN(channel=c.name, where=" throughout"))
+        rests = [c for c in dead if stem == "wheel_rate" and c.values[0] == 0]
+        if len(lively) > len(dead) > len(rests):
+            doubts += [FROZEN(channel=c.name) for c in dead if c not in rests]
     return doubts

@@ -15,6 +15,7 @@ from ...kit.timeline import NS, utc_label
 from ...telemetry.channels import AXES
 from ...telemetry.load import load_telemetry
 from ..entry import BEST, Curve, Entry, Value
+from .declared import contradictions
 from .figures import FIGURES, Actuation, Torque, measure
 
 if TYPE_CHECKING:
@@ -68,8 +69,11 @@ def analyse(event: Event, craft: Craft, telemetry: Telemetry | None = None) -> E
             file=tlm.source, remedy="Times count from the file's epoch.",
         )  # fmt: skip
     results = {basis: _torque(tlm, craft, mechanism, *how) for basis, how in BASES.items()}
-    event = _started(event, results["fused"], mechanism)
     doubts: list[Doubt | None] = list(results["fused"].doubts)
+    doubts += contradictions(
+        event, tlm, Actuation(tlm, event, mechanism), _about_hinge(results["fused"], mechanism, event)
+    )
+    event = _started(event, results["fused"], mechanism)
     torques = {basis: _about_hinge(r, mechanism, event) for basis, r in results.items()}
     values: list[Value] = []
     for figure in FIGURES.values():

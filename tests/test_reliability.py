@@ -1,0 +1,39 @@
+"""docs/reliability.md: every doubt and every test that it names exists."""
+
+import importlib
+import pkgutil
+import re
+
+import pytest
+
+import asflown
+from asflown.kit.doubts import kinds
+from conftest import ROOT
+
+PAGE = (ROOT / "docs" / "reliability.md").read_text()
+ROWS = [
+    [cell.strip() for cell in line.strip("|").split("|")]
+    for line in PAGE.splitlines()
+    if line.startswith("|") and not re.match(r"\|(-|\s*fault)", line)
+]
+TESTS = sorted({name for row in ROWS for name in re.findall(r"`(tests/[^`]+)`", row[2])})
+
+
+def test_every_row_says_what_is_seen_and_names_a_test():
+    assert ROWS
+    for row in ROWS:
+        assert len(row) == 3 and re.search("`[a-z-]+\\.[a-z0-9-]+`|[Rr]efused", row[1]) and "`tests/" in row[2], row
+
+
+def test_every_doubt_named_there_exists():
+    for module in pkgutil.walk_packages(asflown.__path__, "asflown."):
+        if not re.search(r"\.(migrations|cli)(\.|$)", module.name):
+            importlib.import_module(module.name)
+    named = {n for row in ROWS for n in re.findall(r"`([a-z-]+\.[a-z0-9-]+)`", row[1])}
+    assert named <= set(kinds())
+
+
+@pytest.mark.parametrize("name", TESTS)
+def test_every_test_named_there_exists(name):
+    file, _, function = name.partition("::")
+    assert f"def {function}(" in (ROOT / file).read_text()
