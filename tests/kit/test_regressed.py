@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asflown.kit.regressed import Steps, run, smooth
+from asflown.kit.regressed import Changes, Steps, run, smooth
 
 
 def system(seed=3, steps=12) -> Steps:
@@ -75,6 +75,22 @@ def test_law_the_backward_pass_gives_the_slopes_of_the_likelihood():
         assert found.by_drive[k, j] == pytest.approx((at(scale=up) - at()) / h, rel=1e-3, abs=1e-6)
     grown = s.covariance + h * np.diag([1.0, 0, 0])
     assert found.by_first[0, 0] == pytest.approx((at(covariance=grown) - at()) / h, rel=1e-3, abs=1e-6)
+
+
+def test_law_the_backward_pass_gives_the_slopes_in_what_shapes_a_step():
+    s, beta, h = system(), np.array([0.3, -0.2]), 1e-6
+    rng = np.random.default_rng(1)
+    dA, half = rng.standard_normal((2, 2, 3, 3)), rng.standard_normal((2, 2, 3, 3))
+    dQ = half + np.swapaxes(half, 2, 3)
+    found = smooth(s, run(s), beta, Changes(dA, dQ)).by_change
+    for t in range(2):
+        driven = np.concatenate([s.driven, dQ[t : t + 1]])
+        moved = [
+            replace(s, A=s.A + x * dA[t, s.kind], driven=driven, scale=np.column_stack([s.scale, np.full(len(s.kind), x)]))
+            for x in (-h, h)
+        ]
+        low, high = (run(m).log_likelihood(beta) for m in moved)
+        assert found[t] == pytest.approx((high - low) / (2 * h), rel=1e-5)
 
 
 def test_law_covariances_stay_covariances_where_rounding_bites():

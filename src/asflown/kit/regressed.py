@@ -44,6 +44,7 @@ class Filtered:
     product: np.ndarray  # (M, n), P H^T before each measurement
     mean: np.ndarray  # (N, n, 1 + p), before each step's measurements
     covariances: np.ndarray  # (N, n, n), likewise
+    afterwards: np.ndarray  # (N, n, n), after them
 
     @property
     def information(self) -> np.ndarray:
@@ -57,17 +58,26 @@ class Filtered:
 
 
 @dataclass(frozen=True)
+class Changes:
+    """How steps change with T parameters: dA (T, kinds, n, n) of the transitions, and dQ likewise of the covariances of what is new."""
+
+    A: np.ndarray
+    Q: np.ndarray
+
+
+@dataclass(frozen=True)
 class Disturbances:
     """Smoothed at one beta: states (N, n), measurement errors (M,) over their R.
 
     ``by_noise`` (M,), ``by_drive`` (N, J): slope of the log likelihood in the log of each variance;
-    ``by_first``: its matrix of slopes in the first state's covariance."""
+    ``by_first``: its matrix of slopes in the first state's covariance; ``by_change`` (T,): in each parameter of ``Changes``."""
 
     mean: np.ndarray
     error: np.ndarray
     by_noise: np.ndarray
     by_drive: np.ndarray
     by_first: np.ndarray
+    by_change: np.ndarray
 
 
 def run(steps: Steps) -> Filtered:
@@ -79,14 +89,18 @@ def run(steps: Steps) -> Filtered:
     ))  # fmt: skip
 
 
-def smooth(steps: Steps, filtered: Filtered, beta: np.ndarray) -> Disturbances:
+def smooth(steps: Steps, filtered: Filtered, beta: np.ndarray, changes: Changes | None = None) -> Disturbances:
     """The backward pass, for one value of the constants."""
+    if changes is None:
+        none = np.empty((0, steps.driven.shape[1], *steps.A.shape[1:]))
+        changes = Changes(none, none)
     share = np.concatenate([[1.0], -np.asarray(beta, float)])
     e = filtered.innovation @ share
     mean = filtered.mean @ share
     return Disturbances(*_backward(
         _c(steps.A), _entries(steps.A[1:]), _c(steps.driven), _drives(steps.driven), _i(steps.kind), _c(steps.scale), _i(steps.start),
-        _c(steps.H), _c(steps.R), _c(e), filtered.variance, filtered.product, _c(mean), filtered.covariances,
+        _c(steps.H), _c(steps.R), _c(e), filtered.variance, filtered.product, _c(mean), filtered.covariances, filtered.afterwards,
+        _c(changes.A), _drives(changes.A), _c(changes.Q), _drives(changes.Q),
     ))  # fmt: skip
 
 
@@ -137,7 +151,7 @@ def _forward(A, entries, b, driven, drives, kind, scale, start, H, given, R, fir
     N, n = len(kind), A.shape[1]
     M, columns = given.shape
     innovation, variance, product = np.empty((M, columns)), np.empty(M), np.empty((M, n))
-    mean, covariances = np.empty((N, n, columns)), np.empty((N, n, n))
+    mean, covariances, afterwards = np.empty((N, n, columns)), np.empty((N, n, n)), np.empty((N, n, n))
     x, P, left = np.zeros((n, columns)), first.copy(), np.empty(n)
     moved, half, turned = np.empty((n, columns)), np.empty((n, n)), np.empty((n, n))
     for k in range(N):
@@ -190,18 +204,21 @@ def _forward(A, entries, b, driven, drives, kind, scale, start, H, given, R, fir
             for i in range(n):
                 for c in range(i):
                     P[i, c] = P[c, i] = 0.5 * (P[i, c] + P[c, i])
-    return innovation, variance, product, mean, covariances
+        afterwards[k] = P
+    return innovation, variance, product, mean, covariances, afterwards
 
 
 @jit
-def _backward(A, entries, driven, drives, kind, scale, start, H, R, e, variance, product, mean, covariances):
+def _backward(
+    A, entries, driven, drives, kind, scale, start, H, R, e, variance, product, mean, covariances, afterwards, dA, turns, dQ, grows,
+):  # fmt: skip
     N, n = len(kind), A.shape[1]
     error, by_noise = np.empty(len(R)), np.empty(len(R))
     by_drive = np.zeros(scale.shape)
     r, S = np.zeros(n), np.zeros((n, n))  # adjoint and its covariance
     gain, Sg = np.empty(n), np.empty(n)
     before, half, turned = np.empty(n), np.empty((n, n)), np.empty((n, n))
-    smoothed = np.empty((N, n))
+    smoothed, adjoint, by_change = np.empty((N, n)), np.empty((N, n)), np.zeros(len(dA))
     backward = np.ascontiguousarray(entries[:, ::-1])
     for k in range(N - 1, -1, -1):
         for m in range(start[k + 1] - 1, start[k] - 1, -1):
@@ -243,14 +260,29 @@ def _backward(A, entries, driven, drives, kind, scale, start, H, R, e, variance,
             for d in range(len(drives)):
                 j, i, c = drives[d, 0], drives[d, 1], drives[d, 2]
                 by_drive[k, j] += 0.5 * scale[k, j] * driven[j, kind[k], i, c] * (r[i] * r[c] - S[i, c])
+            # of what is new at this step w, and of the state before it x: cov w x^T = -Q S A P, and E w = Q r
+            for d in range(len(grows)):
+                t, i, c = grows[d, 0], grows[d, 1], grows[d, 2]
+                by_change[t] += 0.5 * dQ[t, kind[k], i, c] * (r[i] * r[c] - S[i, c])
+            for d in range(len(turns)):
+                t, i, c = turns[d, 0], turns[d, 1], turns[d, 2]
+                total = 0.0
+                for f in range(len(entries)):
+                    total += S[i, entries[f, 0]] * A[k, entries[f, 0], entries[f, 1]] * afterwards[k - 1, entries[f, 1], c]
+                by_change[t] -= dA[t, kind[k], i, c] * total
+            adjoint[k] = r
             before[:] = 0.0
             for d in range(len(entries)):
                 before[entries[d, 1]] += A[k, entries[d, 0], entries[d, 1]] * r[entries[d, 0]]
             r[:] = before
             _turned(A[k].T, backward, S, half, turned)
             S[:] = turned
+    for k in range(1, N):
+        for d in range(len(turns)):
+            t, i, c = turns[d, 0], turns[d, 1], turns[d, 2]
+            by_change[t] += dA[t, kind[k], i, c] * adjoint[k, i] * smoothed[k - 1, c]
     by_first = np.empty((n, n))
     for i in range(n):
         for c in range(n):
             by_first[i, c] = 0.5 * (r[i] * r[c] - S[i, c])
-    return smoothed, error, by_noise, by_drive, by_first
+    return smoothed, error, by_noise, by_drive, by_first, by_change

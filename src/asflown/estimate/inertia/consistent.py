@@ -14,12 +14,13 @@ from ...kit.rotations import rotation
 from .contradictions import MOST_STEPS
 from .levels import first_levels
 from .linear import WHEEL
+from .misread import in_words
 from .motion import Layout
 from .prior import possible, prior_for
-from .result import Answer, Evidence
+from .result import Answer, Evidence, Misread
 from .slews import find_slews
-from .steps import momentum_step
-from .swings import SWINGS
+from .steps import SWING_KEPT, momentum_step, other_vectors, swing_found
+from .swings import SWING_FOUND, SWINGS, FoundSwing
 from .whole_motion import fit_slews
 
 if TYPE_CHECKING:
@@ -34,6 +35,10 @@ if TYPE_CHECKING:
 #: A step of momentum is kept where it is this large, squared, in its own covariance: of 3 degrees of freedom, chance gives it
 #: once in 1e8, at each of some hundred instants tried.
 _STEP_KEPT = 40.0
+#: A wheel's vector fits otherwise where its difference is this large, squared, in its own covariance; healthy flights have up to 12.
+_OTHERWISE = 40.0
+#: So many undescribed swings are let in.
+_MOST_SWINGS = 2
 #: Time stamps apart by more than this are spoken of. [s]
 _LATE_S = 0.05
 #: Wheel readings that miss the fit by so many times their own scatter are not explained by it.
@@ -100,6 +105,7 @@ def by_whole_motion(
         slews=tuple(find_slews(evidence.time_s, evidence.omega_rad_s, fit.levels.rate)),
         evidence=evidence,
         settings=_settings(fit) | _without_steps(fit, unparted),
+        misread=_misread(fit),
         doubts=[*fit.record.doubts, *leaning, *impossible, *_fit_doubts(fit), _step_doubt(fit, unparted)],
     )
 
@@ -115,6 +121,10 @@ def _explained(
         return fit, None
     for turn in range(MOST_STEPS + 1):
         at, square = momentum_step(fit, prior)
+        swing, larger = swing_found(fit) if turn < _MOST_SWINGS else (None, 0.0)
+        if swing is not None and larger > max(SWING_KEPT, square):
+            fit = fit_of(replace(fit.record, swings=(*fit.record.swings, swing)))
+            continue
         plain = square >= _STEP_KEPT and turn < MOST_STEPS
         if slow is None and (plain or fit.record.steps) and not fit.record.slow:
             slow = fit_of(replace(fit.record.whole or record, slow=True))
@@ -158,6 +168,16 @@ def _step_doubt(fit: SlewFit, unparted: SlewFit | None) -> Doubt | None:
     )
 
 
+def _misread(fit: SlewFit) -> Misread | None:
+    """The wheel whose vector fits otherwise, where one plainly does."""
+    told = other_vectors(fit)
+    k = max(range(len(told)), key=lambda k: told[k].square, default=None)
+    if k is None or told[k].square < _OTHERWISE:
+        return None
+    vector = fit.record.axes[k]
+    return Misread(in_words(fit.record.wheels[k], vector, vector + told[k].value), told[k].square, told[k].moved)
+
+
 def _settings(fit: SlewFit) -> dict:
     """What was fitted besides: noise levels, time offsets, biases."""
     layout, noise, beta, sigma = fit.layout, fit.levels, fit.beta, fit.sigma
@@ -176,6 +196,7 @@ def _settings(fit: SlewFit) -> dict:
         "wander_Nms_per_root_s": noise.wander or None,
         "rate_bias_rad_s": None if layout.bias is None else beta[layout.bias],
         "swings": {name: list(found) for name, found in _amplitudes(fit).items()},
+        "swings_found": _found(fit),
         "arcs": len(fit.record.arcs),
         "left_out": int((~fit.weighted.kept).sum()),
         "rounds": fit.rounds,
@@ -186,8 +207,18 @@ def _settings(fit: SlewFit) -> dict:
 def _amplitudes(fit: SlewFit) -> dict[str, tuple[float, float]]:
     """Of what swings, over what the craft file says, with sigma."""
     at = fit.layout.amplitudes
-    names = [s.name for s in fit.record.swings]
-    return {n: (float(b), float(s)) for n, b, s in zip(names, fit.beta[at], fit.sigma[at], strict=True)}
+    names = [s.name for s in fit.record.swings if not isinstance(s, FoundSwing)]
+    return {n: (float(b), float(s)) for n, b, s in zip(names, fit.beta[at], fit.sigma[at], strict=False)}
+
+
+def _found(fit: SlewFit) -> list[dict]:
+    """What swings and is not described: its frequency, damping, and the elements (6,) of its delta delta^T."""
+    swings = [s for s in fit.record.swings if isinstance(s, FoundSwing)]
+    parts = fit.beta[fit.layout.size - FoundSwing.FREE * len(swings) : fit.layout.size].reshape(-1, FoundSwing.FREE)
+    return [
+        {"frequency_Hz": s.frequency / (2 * np.pi), "damping": s.damping, "coupling_kgm2": s.size * part}
+        for s, part in zip(swings, parts, strict=True)
+    ]
 
 
 def _evidence(fit: SlewFit) -> Evidence:
@@ -214,6 +245,10 @@ def _fit_doubts(fit: SlewFit) -> list[Doubt]:
     ]
     if fit.converged:
         doubts += [SWINGS(name=name, share=share, sigma=s) for name, (share, s) in _amplitudes(fit).items()]
+    mean = float(np.trace(tensor_of(beta[layout.TENSOR]))) / 3
+    for found in _found(fit):
+        share = np.abs(np.linalg.eigvalsh(tensor_of(found["coupling_kgm2"]))).max() / mean
+        doubts.append(SWING_FOUND(frequency_Hz=found["frequency_Hz"], percent=100 * share))
     out = int((~fit.weighted.kept).sum())
     if out:
         doubts.append(OUTLIERS(outliers=out))

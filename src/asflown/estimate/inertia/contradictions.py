@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import combinations, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,13 +14,11 @@ from ...kit.errors import BadInput
 from ...kit.regression import memory
 from ...kit.rotations import rotation
 from ...kit.scatter import robust_sigma
-from ...telemetry.attitude import MISTAKEN_UNITS
+from .misread import misread
 from .motion import Layout, first_motion
-from .plain import left_of_slow, plain_fit
+from .plain import plain_fit
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from .record import SlewRecord
     from .slews import Slew
 
@@ -47,9 +44,19 @@ def conserved(record: SlewRecord, slews: list[Slew], source: str | None) -> Slew
     slow torque is tried first: there is always one.
 
     Raises BadInput, naming the likeliest mistake, where another reading of the data conserves it far better.  Tried: the
-    quaternion in the other direction, rates in another unit where no attitude shows it, one wheel turning the other
-    way, two wheels mistaken for each other, in all of the record or after one of its slews."""
+    quaternion in the other direction, rates in another unit where no attitude shows it, and what ``misread`` tries of the wheels."""
     beta, left = plain_fit(record)
+    limit = _TOO_MUCH**2 * _variance(record) * len(record.momentum.time_s)
+    conserves = left <= limit
+    if not conserves:
+        mistake, mended, left = misread(record, slews, limit)
+        if mended * _MENDED**2 < left:
+            raise BadInput(
+                f"momentum is not conserved, and would be {np.sqrt(left / max(mended, 1e-300)):.0f} times better if {mistake}",
+                file=source,
+                remedy="Correct the column names and units, the craft's wheel axes and spin inertia or the quaternion's direction, or leave "
+                "the span out (--start, --stop).",
+            )
     if slews and np.all(np.diag(tensor_of(beta[Layout.TENSOR])) < 0):
         raise BadInput(
             "the wheels turn with the body and not against it, as if its inertia were negative: momentum would be conserved if all of "
@@ -57,21 +64,8 @@ def conserved(record: SlewRecord, slews: list[Slew], source: str | None) -> Slew
             file=source,
             remedy="Reverse the wheels' axes in the craft file, or the sense of their rates.",
         )
-    limit = _TOO_MUCH**2 * _variance(record) * len(record.momentum.time_s)
-    if left <= limit:
+    if conserves:
         return record
-    # in orbit outside torques are at work beside the mistake, and would hide how much mending it helps
-    left_of = left_of_slow if record.orbit is not None else lambda r: plain_fit(r)[1]
-    left = left_of(record)
-    tried = {what: left_of(other) for what, other in _others(record, slews)}
-    best = min(tried, key=lambda w: tried[w], default=None)
-    if best is not None and tried[best] * _MENDED**2 < left:
-        raise BadInput(
-            f"momentum is not conserved, and would be {np.sqrt(left / max(tried[best], 1e-300)):.0f} times better if {best}",
-            file=source,
-            remedy="Correct the column names and units, the craft's wheel axes or the quaternion's direction, or leave the span out "
-            "(--start, --stop).",
-        )
     if record.orbit is not None and left <= limit:
         return replace(record, slow=True)
     parted = record
@@ -125,44 +119,3 @@ def _step_of_momentum(time_s: np.ndarray, residual_N: np.ndarray, arc: np.ndarra
             j = int(np.argmax(gain)) + 10
             best, at = float(gain.max()), float(0.5 * (time_s[here[j - 1]] + time_s[here[j]]))
     return at
-
-
-def _others(record: SlewRecord, slews: list[Slew]) -> Iterator[tuple[str, SlewRecord]]:
-    if record.has_attitude:
-        turned = record.attitude.q_NB * np.array([1.0, -1.0, -1.0, -1.0])
-        yield "the quaternion were its conjugate", replace(record, attitude=replace(record.attitude, q_NB=turned))
-    else:
-        for factor, unit in MISTAKEN_UNITS.items():
-            rates = replace(record.rates, value_rad_s=record.rates.value_rad_s / factor)
-            yield f"the body rates were {unit}", replace(record, rates=rates)
-    n = len(record.axes)
-    if record.spins is None and (n != 3 or abs(np.linalg.det(record.axes)) < 1e-9 * np.abs(record.axes).max() ** 3):
-        return
-    times = [None, *[0.5 * (a.stop_s + b.start_s) for a, b in pairwise(slews)]]
-    for after in times:
-        when = "" if after is None else f" from {after:.0f} s of the record on"
-        for k, name in enumerate(record.wheels):
-            flipped = record.axes.copy()
-            flipped[k] *= -1
-            yield f"wheel {name} turned the other way{when}", _read_as(record, flipped, after)
-        for i, j in combinations(range(n), 2):
-            swapped = record.axes.copy()
-            swapped[[i, j]] = swapped[[j, i]]
-            what = f"wheels {record.wheels[i]} and {record.wheels[j]} were mistaken for each other{when}"
-            yield what, _read_as(record, swapped, after)
-
-
-def _read_as(record: SlewRecord, axes: np.ndarray, after: float | None) -> SlewRecord:
-    """The same readings, the wheels' momentum along other axes (n, 3)."""
-    m = record.momentum
-    _, h, index = m.vectors(m.value_Nms)
-    if record.spins is None:
-        change = h @ np.linalg.inv(record.axes) @ axes - h
-        other = np.sum(m.direction * change[index], axis=1)
-    else:
-        at, readings = record.spins
-        change = readings @ (axes - record.axes)
-        other = np.sum(m.direction * change[np.searchsorted(at, m.time_s)], axis=1)
-    late = np.ones(len(index), bool) if after is None else m.time_s > after
-    value = m.value_Nms + np.where(late, other, 0.0)
-    return replace(record, momentum=replace(m, value_Nms=value))

@@ -107,10 +107,6 @@ def likeliest(weighted: Weighted, levels: Levels, around: Around | None) -> Leve
     def cost(logs):
         trial = replace(levels, **dict(zip(names, np.exp(logs), strict=True)))
         value, slope = _cost_and_slope(part, trial, around)
-        h = 0.02
-        for n in _LASTS.keys() & set(names):
-            other = replace(trial, **{n: getattr(trial, n) * np.exp(h)})
-            slope[n] = (_cost(part, other, around) - value) / h
         return value, np.array([slope[n] for n in names])
 
     reach = np.log([_REACH.get(n, 10.0) for n in names])  # of one call; a far step of the search would end in rounding
@@ -177,15 +173,17 @@ def _cost(weighted: Weighted, levels: Levels, around: Around | None) -> float:
 
 
 def _cost_and_slope(weighted: Weighted, levels: Levels, around: Around | None) -> tuple[float, dict[str, float]]:
-    """Minus log likelihood, and its slope in the log of every level but the coloured error's time constant."""
+    """Minus log likelihood, and its slope in the log of every level and time constant."""
     model, steps = weighted.model, weighted.steps(levels)
     f, whole, penalty = _pass(steps, model.layout, around)
-    s = smooth(steps, f, whole)
+    lasting, changes = model.changes(levels)
+    s = smooth(steps, f, whole, changes)
     noise = np.where(weighted.kept, s.by_noise, 0.0)
     slope = {name: -2 * noise[model.kind == k].sum() for k, name in enumerate(("wheel", "rate", "attitude"))}
     slope["jerk"] = -2 * s.by_drive[:, :3].sum()
     if model.walks == 2:
         slope["kick"] = -2 * s.by_drive[:, 3:6].sum()
+    slope |= {name: -float(s.by_change[t]) for t, name in enumerate(lasting)}
     part = model.states.coloured
     if part is not None:
         first = levels.coloured**2 * np.trace(s.by_first[part, part])

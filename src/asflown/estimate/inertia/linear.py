@@ -21,7 +21,7 @@ import scipy
 
 from ...dynamics.momentum import grown_by
 from ...dynamics.rigid_body import momentum_regressor
-from ...kit.regressed import Steps
+from ...kit.regressed import Changes, Steps
 from ...kit.rotations import rotation
 from .motion import Layout, Motion, Reference, turned
 
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 _FIRST = 100.0
 #: Variance of an outlier over that of its neighbours: it stays in the tables and has no weight.
 OUTLIER_VARIANCE = 1e12
+#: By this share a time constant is moved to see how a step's covariance changes.
+_NUDGE = 1e-4
 #: Kinds of measurement.
 WHEEL, RATE, ATTITUDE = 0, 1, 2
 
@@ -125,6 +127,25 @@ class Linearized:
             A, self.b, np.array(driven), self.which, np.column_stack(scale), self.start, self.H,
             self.y, self.Z, R, first,
         )  # fmt: skip
+
+    def changes(self, levels: Levels) -> tuple[tuple[str, ...], Changes]:
+        """The time constants that are modelled, and how steps change with the log of each."""
+        dt, n, found = self.steps_s, self.states.size, {}
+        if self.states.coloured is not None:
+            x, part = dt / levels.coloured_s, self.states.coloured
+            keep = np.exp(-x)
+            dA = _noise(dt, n, part, x * keep)
+            found["coloured_s"] = dA, _noise(dt, n, part, -2 * x * keep**2 * levels.coloured**2)
+        if self.states.slow is not None:
+            brought, torque = _halves(self.states.slow)
+            x = dt / levels.slow_s
+            keep = np.exp(-x)
+            dA = _noise(dt, n, torque, x * keep)
+            dA[:, brought, torque] = np.eye(3) * (levels.slow_s * (1 - keep - x * keep))[:, None, None]
+            low, high = (_slow_torque(dt, n, brought, torque, levels.slow_s * f)[1] for f in (1 - _NUDGE, 1 + _NUDGE))
+            found["slow_s"] = dA, (high - low) / (2 * _NUDGE) * levels.slow**2
+        shape = (len(found), len(dt), n, n)
+        return tuple(found), Changes(*(np.reshape([f[k] for f in found.values()], shape) for k in range(2)))
 
 
 def _noise(dt: np.ndarray, n: int, part: slice, variance: np.ndarray) -> np.ndarray:
@@ -234,9 +255,8 @@ def _wheel_rows(about: Reference, states: States, frame: str, seen: np.ndarray) 
     w, alpha, Rk = motion.omega_B[k], motion.alpha_B[k], R[k]
     L = np.einsum("nji,nj->ni", Rk, layout.momenta(beta)[m.arc] + added[k])  # of everything, body axes
     predicted = L - w @ I_B
-    held = np.zeros((len(k), 3, layout.swings))
-    for j, swing in enumerate(about.record.swings):
-        held[:, :, j] = swing.momentum(motion.time_s, motion.alpha_B)[k]
+    swings = [swing.columns(motion.time_s, motion.alpha_B)[k] for swing in about.record.swings]
+    held = np.concatenate(swings, axis=2) if swings else np.zeros((len(k), 3, 0))
     predicted = predicted - held @ beta[layout.amplitudes]
     H = np.zeros((len(k), states.size))
     H[:, :3] = np.cross(d, L)

@@ -86,7 +86,7 @@ class Layout:
             skew_rates, at = at, at + 1
         if record.has_rates:
             bias, at = slice(at, at + 3), at + 3
-        swings = len(record.swings)
+        swings = sum(s.FREE for s in record.swings)
         return cls(len(record.arcs), skew_wheels, skew_rates, bias, at + swings, record.levers, swings)
 
 

@@ -26,9 +26,14 @@ def plain_fit(record: SlewRecord, beta: np.ndarray | None = None, skew_s: float 
     return _solved(beta, columns, value, rounds=3)  # a few wild readings must not decide where the fit starts
 
 
-def left_of_slow(record: SlewRecord) -> float:
-    """Squares left over where the momentum may also change slowly: polynomials of time, one degree for every ``_SLOW_S``."""
+def of_momentum(record: SlewRecord) -> tuple[np.ndarray, np.ndarray]:
+    """What least squares of momentum is made of: columns (M, p) and values (M,).
+
+    In orbit the momentum may also change slowly, by polynomials of time, one degree for every ``_SLOW_S``: outside torques are
+    at work there beside a mistake, and would hide how much mending it helps."""
     _, columns, value = _equations(record, None, 0.0)
+    if record.orbit is None:
+        return columns, value
     m = record.momentum
     times = np.unique(m.time_s)
     span = times[-1] - times[0]
@@ -36,8 +41,7 @@ def left_of_slow(record: SlewRecord) -> float:
     powers = np.polynomial.legendre.legvander(2 * (m.time_s - times[0]) / span - 1, degree)[:, 1:]
     motion = first_motion(record, times)
     inertial = rotation(motion.q_NB[np.searchsorted(times, m.time_s)]).apply(m.direction)
-    slow = (inertial[:, :, None] * powers[:, None, :]).reshape(len(value), -1)
-    return _solved(np.zeros(columns.shape[1] + slow.shape[1]), np.column_stack([columns, slow]), value, rounds=3)[1]
+    return np.column_stack([columns, (inertial[:, :, None] * powers[:, None, :]).reshape(len(value), -1)]), value
 
 
 def fit_of_changes(record: SlewRecord, beta: np.ndarray, skew_s: float) -> tuple[np.ndarray, float]:

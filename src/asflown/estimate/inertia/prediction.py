@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...craft.model import STALE_NS, Craft, InertiaRequirement, MassProperties, tensor
+from ...craft.model import PREDICTED_SHARE, STALE_NS, Craft, InertiaRequirement, MassProperties, tensor
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput
 from ...kit.result import per_spin_inertia
@@ -21,8 +21,9 @@ ROWS = {"Ixx": (0, 0), "Iyy": (1, 1), "Izz": (2, 2), "Ixy": (0, 1), "Ixz": (0, 2
 MET, NOT_MET, OPEN = "met", "not met", "open"
 #: Moments whose ratio is this near to a unit's factor, and alike within this, are taken for a wrong unit.
 _NEAR_FACTOR, _ALIKE = 1.25, 1.5
-#: A common factor beyond this is no error of a prediction, whose moments are known to a tenth.
-_OFF_SCALE = 1.4
+#: An estimate so many of the prediction's sigmas away from it, and by this share at least, is no error of the prediction; three sigmas
+#: of the estimate come on top.
+_FAR_SIGMAS, _FAR_SHARE = 5.0, 0.1
 
 NO_PREDICTION = Kind(
     "inertia.no-prediction", Severity.NOTE,
@@ -47,6 +48,12 @@ OFF_SCALE = Kind(
     "all moments are {ratio:.3g} times the predicted ones, more than a prediction is wrong by: the wheels' spin inertia, or the factor of "
     "their rates, is the scale of the tensor",
     "Check spin_inertia in the craft file and the wheels' rates, or the prediction.",
+)  # fmt: skip
+FAR_FROM_PREDICTION = Kind(
+    "inertia.far-from-prediction", Severity.SUSPECT,
+    "{element} is {ratio:.3g} times the predicted one, more than a prediction known to {percent:.0f} % is wrong by: the spin inertia, the sense "
+    "or the axis of the wheels that turn the craft about that axis would do that",
+    "Check these wheels in the craft file and their rates, or the prediction (its sigma is a key of [[mass_properties]]).",
 )  # fmt: skip
 
 
@@ -103,6 +110,7 @@ class Prediction:
     source: str
     requirement: InertiaRequirement | None = None
     doubts: Doubts = Doubts()
+    share: float = PREDICTED_SHARE  # one sigma of the moments
 
 
 @dataclass(frozen=True)
@@ -223,18 +231,19 @@ def predicted_inertia(craft: Craft, tai_ns: int | None) -> Prediction:
     asked = craft.inertia_requirement
     if candidates:
         m = min(candidates, key=lambda m: abs(m.date - moment))
-        return Prediction(tensor(m.elements), "predicted", _day(m.date), m.source, asked, _age(m, moment))
+        return Prediction(tensor(m.elements), "predicted", _day(m.date), m.source, asked, _age(m, moment), m.share or PREDICTED_SHARE)
     now = craft.at(tai_ns)
     if now.inertia_kgm2 is None:
         raise BadInput(
             f"{craft.name} has no inertia to compare an estimate with",
             remedy="Add [[mass_properties]] to the craft file, or give --inertia.",
         )
+    share = craft.inertia_share or PREDICTED_SHARE
     if piece == "given":
-        return Prediction(now.inertia_kgm2, "craft's", "any date", "given by the user", asked, now.doubts)
+        return Prediction(now.inertia_kgm2, "craft's", "any date", "given by the user", asked, now.doubts, share)
     source = "the craft's tensor on that date, which may itself be an estimate"
     doubts = Doubts([NO_PREDICTION(), *now.doubts])
-    return Prediction(now.inertia_kgm2, "craft's", _day(moment), source, asked, doubts)
+    return Prediction(now.inertia_kgm2, "craft's", _day(moment), source, asked, doubts, share)
 
 
 def _day(tai_ns: int) -> str:
@@ -264,7 +273,7 @@ def compare_inertia(estimate, prediction: Prediction, *, sigma=None, relative: b
         rows.append(Compared(name, predicted, estimated, s, error, s_error, asked, _verdict(error, s_error, asked)))
     moments = np.linalg.eigvalsh(I_B)
     margin = float(moments.sum() / 2 - moments[-1])
-    found = [_impossible(float(moments[0]), margin), _wrong_unit(I_B, prediction.inertia_kgm2, relative=relative)]
+    found = [_impossible(float(moments[0]), margin), _far_away(I_B, prediction, sigma, relative=relative)]
     return InertiaComparison(
         prediction, tuple(rows), float(moments[0]), margin, relative, prediction.doubts + Doubts(found)
     )
@@ -284,18 +293,36 @@ def _impossible(smallest: float, margin: float) -> Doubt | None:
     return IMPOSSIBLE(quantity="triangle margin", value=margin) if margin < 0 else None
 
 
-def _wrong_unit(estimate, predicted, *, relative: bool) -> Doubt | None:
-    """Moments are a wheel's rate over the body's: a factor in either shows in all three."""
-    ratio = np.diag(estimate) / np.diag(predicted)
-    if (ratio <= 0).any() or ratio.max() / ratio.min() > _ALIKE:
-        return None
+def _far_away(estimate: np.ndarray, prediction: Prediction, sigma, *, relative: bool) -> Doubt | None:
+    """Moments are a wheel's rate over the body's: a factor in either shows in all three, and that of one wheel in some."""
+    predicted = np.diag(prediction.inertia_kgm2)
+    ratio = np.diag(estimate) / predicted
+    if (ratio <= 0).any():
+        return None  # impossible, which is said
     mean = float(np.exp(np.mean(np.log(ratio))))
-    guesses = [
+    alike = ratio.max() / ratio.min() < _ALIKE
+    guesses = _units(mean) if alike else []
+    if guesses:
+        return WRONG_UNIT(ratio=mean, guesses=", or the ".join(guesses))
+    if relative:
+        return None
+    apart = np.log(1 + max(_FAR_SIGMAS * prediction.share, _FAR_SHARE))
+    if sigma is not None:
+        apart = apart + 3 * np.diag(np.asarray(sigma, float)) / predicted
+    far = np.abs(np.log(ratio)) > apart
+    if far.all() and alike:
+        return OFF_SCALE(ratio=mean)
+    if not far.any():
+        return None
+    k = int(np.argmax(np.where(far, np.abs(np.log(ratio)), 0.0)))
+    return FAR_FROM_PREDICTION(element=f"I{2 * 'xyz'[k]}", ratio=ratio[k], percent=100 * prediction.share)
+
+
+def _units(ratio: float) -> list[str]:
+    """Wrong units that would make all moments so many times too large."""
+    return [
         f"{which} rates {words}"
-        for which, scale in (("body", 1 / mean), ("wheel", mean))
+        for which, scale in (("body", 1 / ratio), ("wheel", ratio))
         for factor, words in MISTAKEN_UNITS.items()
         if abs(np.log(scale / factor)) < np.log(_NEAR_FACTOR)
     ]
-    if guesses:
-        return WRONG_UNIT(ratio=mean, guesses=", or the ".join(guesses))
-    return OFF_SCALE(ratio=mean) if not relative and abs(np.log(mean)) > np.log(_OFF_SCALE) else None

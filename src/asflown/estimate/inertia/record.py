@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from ...dynamics.orbit import Orbit
     from .surroundings import Surroundings
-    from .swings import Swing
+    from .swings import FoundSwing, Swing
 
 MOMENTUM_STEPS = Kind(
     "inertia.momentum-steps", Severity.SUSPECT,
@@ -112,7 +112,7 @@ class SlewRecord:
     spins: tuple[np.ndarray, np.ndarray] | None = (
         None  # instants (N,) and readings (N, n) of all wheels, where they are read together
     )
-    swings: tuple[Swing, ...] = ()
+    swings: tuple[Swing | FoundSwing, ...] = ()  # those found stand last
     wanders: bool = False
     slow: bool = False
     orbit: Orbit | None = None

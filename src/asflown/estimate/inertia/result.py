@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -81,6 +81,15 @@ class Evidence:
     used: np.ndarray  # (N,) bool
 
 
+class Misread(NamedTuple):
+    """A wheel whose vector (axis times spin inertia) fits otherwise: how, in words, the square of the difference in its own covariance
+    (chi square of 3), and what it would move the elements by (6,)."""
+
+    words: str
+    square: float
+    moved: np.ndarray
+
+
 @dataclass(frozen=True, kw_only=True)
 class Answer:
     """What a method gives: elements (6,) with their covariance (6, 6), and the tensors (2, 3, 3) that unit scale errors of
@@ -98,6 +107,7 @@ class Answer:
     slews: tuple[Slew, ...] = ()
     products: dict[str, tuple[float, float]] = field(default_factory=dict)
     settings: dict = field(default_factory=dict)
+    misread: Misread | None = None
     doubts: list[Doubt | None]
 
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...dynamics.rigid_body import ELEMENTS, tensor_of
+from ...dynamics.rigid_body import ELEMENTS, elements_of, tensor_of
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput, check_choice
 from ...kit.result import recorded
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from ...craft.model import Craft
     from ...telemetry.telemetry import Telemetry
     from .record import SlewRecord
+    from .result import Misread
 
 METHODS = ("consistent", "gls", "all", "axis")
 FRAMES = ("body", "inertial")
@@ -62,6 +63,15 @@ SLOW_BY_SAMPLES = Kind(
     "{off:.2g} ({element})",
     "Use --method consistent.",
 )  # fmt: skip
+WHEEL_MISREAD = Kind(
+    "inertia.wheel-misread", Severity.SUSPECT,
+    "momentum would be conserved better (chi square {square:.0f} of 3) if {words}: {element} would move by {moved:+.3g}, {sigmas:.1f} total "
+    "sigma",
+    "Check that wheel's axis and spin_inertia in the craft file, and the scale of its rate.",
+)  # fmt: skip
+
+#: A misread wheel is doubted where it moves an element by so many total sigmas.
+_MOVED = 2.0
 
 
 @recorded
@@ -262,6 +272,7 @@ def _result(subject: Subject, answer: Answer, wheel_scale: float, rate_scale: fl
         settings=answer.settings | {"wheel_scale_sigma": wheel, "rate_scale_sigma": rate_scale},
         doubts=Doubts([*answer.doubts, PER_SPIN_INERTIA(what="tensor and torque are") if subject.relative else None]),
     )
+    result = replace(result, doubts=result.doubts + Doubts([_misread_doubt(result, answer.misread)]))
     if not craft.mass_properties or not np.isfinite(result.inertia_kgm2).all():
         return result
     comparison = compare_inertia(
@@ -269,3 +280,16 @@ def _result(subject: Subject, answer: Answer, wheel_scale: float, rate_scale: fl
         sigma=result.inertia_sigma_kgm2 if result.settled else None, relative=subject.relative,
     )  # fmt: skip
     return replace(result, comparison=comparison, doubts=result.doubts + comparison.doubts)
+
+
+def _misread_doubt(result: InertiaResult, found: Misread | None) -> Doubt | None:
+    """Of a wheel that fits otherwise, where that matters."""
+    if found is None or not result.settled:
+        return None
+    share = np.abs(found.moved) / elements_of(result.inertia_sigma_kgm2)
+    k = int(np.argmax(share))
+    if share[k] < _MOVED:
+        return None
+    return WHEEL_MISREAD(
+        square=found.square, words=found.words, element=ELEMENTS[k], moved=found.moved[k], sigmas=share[k]
+    )
