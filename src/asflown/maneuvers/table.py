@@ -42,6 +42,7 @@ ENGINE_SPELLINGS = Kind(
     "Write each engine's name in one way.",
 )  # fmt: skip
 
+
 @dataclass(frozen=True)
 class Maneuvers:
     """N maneuvers in order of time (of the file where it has no times); SI, errors in the TVC frame.
