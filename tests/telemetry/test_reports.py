@@ -203,7 +203,7 @@ def test_recovery_units_as_people_write_them(case):
         try:
             parse_unit(unit)
         except BadInput as why:
-            assert unit == "furlong" and why.remedy  # noqa: PT017
+            assert unit == "furlong" and why.remedy
 
 
 @of("48")
