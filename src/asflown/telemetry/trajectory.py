@@ -16,7 +16,7 @@ import numpy as np
 from ..kit.errors import BadInput
 from ..kit.files import sha256_of
 from ..kit.quantities import si_factor
-from .assemble import origin_of, time_scale
+from .assemble import origin_of, time_column
 from .channels import AXES, split_header
 from .tables import Table, numbers_of, times_of
 from .text import read_csv
@@ -54,9 +54,9 @@ def _read(path: Path) -> TrajectoryTable:
     except OSError as why:
         raise BadInput(f"the trajectory cannot be read ({why.strerror})", remedy="Check the path.") from None
     table = read_csv(data)
-    scale = time_scale(table)
+    at, scale = time_column(table)
     origin = origin_of(table.epoch)
-    tai_ns = times_of(table, 0, scale, origin or 0)
+    tai_ns = times_of(table, at, scale, origin or 0)
     columns = {
         stem: np.stack([_column(table, f"{stem}_{a}", unit) for a in AXES], axis=1) for stem, unit in _UNITS.items()
     }
