@@ -188,7 +188,9 @@ def gates_patch(
 
 def _check_ledger(m: Maneuvers, at: int, burn: str) -> None:
     """Raises BadInput where an adjustment is listed for all burns before a patch and for none from it on: it is that patch."""
-    before, after = ([{a.name for a in book if a.name != SCALE} for book in part] for part in (m.ledger[:at], m.ledger[at:]))
+    before, after = (
+        [{a.name for a in book if a.name != SCALE} for book in part] for part in (m.ledger[:at], m.ledger[at:])
+    )
     done = set.intersection(*before) - set.union(*after)
     if done:
         raise BadInput(
