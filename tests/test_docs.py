@@ -261,3 +261,14 @@ def test_the_own_spacecraft_page_runs_as_it_stands(tmp_path, monkeypatch):
             missing = [line for line in text.splitlines() if _masked(line) not in lines]
             assert not missing, f"{missing} not in\n{told}"
     assert {"mysat.db", "hold", "slews", "run-downs"} <= {p.name for p in tmp_path.iterdir()}
+
+
+def test_the_page_on_frames_runs_as_it_stands(tmp_path, monkeypatch):
+    pytest.importorskip("pandas")
+    monkeypatch.chdir(tmp_path)
+    names: dict = {}
+    for _, _, text in _FENCE.findall(page("howto/frames.md")):
+        exec(text, names)
+    assert names["again"].epoch_ns == names["telemetry"].epoch_ns
+    assert {n: len(c.values) for n, c in names["again"].channels.items()} == {"wheel_rate_1": 120, "body_rate_x": 120}
+    assert len(names["burns"]) == 2

@@ -61,3 +61,25 @@ def test_law_factors_kept_at_hand_are_astropys():
 
     for (text, expected), factor in _COMMON.items():
         assert factor == pytest.approx(parse_unit(text).to(parse_unit(expected)), rel=4e-16), text
+
+
+@pytest.mark.parametrize(
+    ("written", "expected", "factor"),
+    [
+        ("DEG/S", "rad/s", math.pi / 180), ("degrees per second", "rad/s", math.pi / 180), ("rad·s⁻¹", "rad/s", 1), ("RAD/S", "rad/s", 1),
+        ("rps", "rad/s", 2 * math.pi), ("krpm", "rad/s", 100 * math.pi / 3), ("revolutions/min", "rad/s", math.pi / 30),
+        ('"', "rad", math.pi / 648_000), ("arc-sec", "rad", math.pi / 648_000), ("N-m", "N m", 1), ("mN·m", "N m", 1e-3),
+        ("in-lb", "N m", 0.1129848), ("oz-in", "N m", 0.00706155), ("kg·m²/s", "N m s", 1), ("ft-lb-s", "N m s", 1.355818),
+        ("Nm s", "N m s", 1), ("A·m²", "A m2", 1), ("Bar", "Pa", 1e5), ("milliamps", "A", 1e-3), ("KM/S", "m/s", 1e3), ("N/A", "", 1),
+    ],
+)  # fmt: skip
+def test_published_units_as_people_spell_them(written, expected, factor):
+    assert si_factor(written, expected) == pytest.approx(factor, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("written", "expected"), [("nm", "N m"), ("S", "s"), ("psig", "Pa"), ("rad/s/s", "rad/s"), ("r/s", "rad/s")]
+)
+def test_units_that_mean_something_else_are_refused(written, expected):
+    with pytest.raises(BadInput):
+        si_factor(written, expected)

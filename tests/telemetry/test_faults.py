@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from asflown.kit.timeline import NS
+from asflown.telemetry.channels import to_si
+from asflown.telemetry.findings import NO_SIGN
 from asflown.telemetry.screening import needs_a_look, screen
 from asflown.telemetry.telemetry import Channel, Telemetry
 
@@ -164,3 +166,85 @@ def test_law_a_tachometer_that_holds_after_the_wheel_stopped_is_left_out():
     coast[120:] = coast[119]
     t = screened({"wheel_rate_1": np.round(coast, 3)})
     assert not t.channels["wheel_rate_1"].valid[121:].any() and t.channels["wheel_rate_1"].valid[:120].all()
+
+
+@pytest.mark.parametrize("unit", ["rpm", "deg/s"])
+@pytest.mark.parametrize("rows", [slice(0, 1), slice(0, 3), slice(N - 4, N)])
+@pytest.mark.parametrize("value", [-9999.0, 32767.0, 999.99])
+def test_law_fill_values_as_they_were_written_are_known_at_the_ends(unit, rows, value):
+    values = hold()
+    for name in ("wheel_rate_2",) if unit == "rpm" else ("body_rate_y",):
+        factor, _ = to_si(name, unit)
+        values[name][rows] = value * factor
+    t = screened(values, unit_given=unit)
+    assert found(t, "fill") == rows.stop - rows.start and needs_a_look(t)
+
+
+@pytest.mark.parametrize("rows", [slice(0, 1), slice(0, 3), slice(300, 304), slice(N - 2, N)])
+@pytest.mark.parametrize("value", [0.0, -1.0])
+def test_law_a_packet_of_one_value_is_left_out(rows, value):
+    values = hold()
+    for k in (1, 2, 3):
+        values[f"wheel_rate_{k}"][rows] = value
+    t = screened(values)
+    assert all((~t.channels[f"wheel_rate_{k}"].valid).sum() == rows.stop - rows.start for k in (1, 2, 3))
+    assert all(t.channels[f"body_rate_{a}"].valid.all() for a in "xyz")
+
+
+def test_law_a_counter_that_goes_on_was_not_reset():
+    counts = np.cumsum(np.arange(N) % 20 == 0) * 0.125 + 1000
+    for value in (0.0, -9999.0, 65535.0):
+        broken = counts.copy()
+        broken[200:204] = value
+        t = screened({"on_time_Z1": broken})
+        assert found(t, "fill") == 4 and found(t, "fall") == 0
+    reset = np.where(np.arange(N) < 300, counts, counts - counts[300])
+    assert found(screened({"on_time_Z1": reset}), "fall") == 1
+
+
+@pytest.mark.parametrize("offset_s", [600, -600, 1200, 18])
+def test_law_samples_stamped_wrongly_where_they_are_missing_are_strays(offset_s):
+    tai_ns = np.arange(N) * NS
+    tai_ns[200:204] += offset_s * NS
+    t = screened(hold(), tai_ns)
+    assert found(t, "stray") == 4 and found(t, "conflict") == 0
+
+
+def test_law_a_clock_that_was_not_set_yet_says_an_old_date():
+    tai_ns = np.arange(N) * NS + 50 * 365 * 86_400 * NS // 2
+    tai_ns[:30] = np.arange(30) * NS
+    assert found(screened(hold(), tai_ns), "stray") == 30
+
+
+@pytest.mark.parametrize("digits", [3, 4, 12])
+def test_law_copies_over_two_links_are_told_in_every_channel(digits):
+    once = hold()
+    tai_ns = np.repeat(np.arange(N) * NS, 2)
+    tai_ns[1::2] += 20_000_000
+    twice = {n: np.column_stack([v, [float(f"{x:.{digits}g}") for x in v]]).ravel() for n, v in once.items()}
+    t = screened(twice, tai_ns)
+    assert all(len(c.values) == N for c in t.channels.values())
+
+
+@pytest.mark.parametrize("modulus", [25.6, 204.8, 6553.6])
+def test_law_wraps_of_any_width_are_told(modulus):
+    values = hold()
+    cross = np.linspace(5, -5, N) + 0.05 * np.sin(np.arange(N) / 7)
+    values["wheel_rate_2"] = np.mod(np.rint(cross / 0.05) * 0.05, modulus)
+    assert found(screened(values), "fall") >= 1
+
+
+def test_law_coarse_wheels_do_not_wrap():
+    values = hold(noise=0.02)
+    for step in (0.1, 0.5, 1.0):
+        assert found(screened({n: np.rint(v / step) * step for n, v in values.items() if n.startswith("wheel")}), "fall") == 0  # fmt: skip
+
+
+def test_law_a_tachometer_without_sign_is_told_by_its_fold():
+    values = hold()
+    cross = np.linspace(5, -5, N) + 0.05 * np.sin(np.arange(N) / 7)
+    values["wheel_rate_2"] = np.abs(cross)
+    assert screened(values).doubts.of(NO_SIGN)
+    for sound in (cross, 5 + np.abs(cross), 3 + 2 * np.sin(np.arange(N) / 60)):
+        values["wheel_rate_2"] = sound
+        assert not screened(values).doubts.of(NO_SIGN)

@@ -228,3 +228,52 @@ def test_law_a_text_too_large_for_the_slow_way_is_refused(tmp_path, monkeypatch)
     monkeypatch.setattr(text, "SLOW_LIMIT", 50)
     with pytest.raises(BadInput, match="cell by cell"):
         loaded(tmp_path, 'time [s],body_rate_y [rad/s]\n"0",1\n"1",2\n"2",3\n"3",4\n')
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        "%Y-%j/%H:%M:%S", "%Y %j %H:%M:%S", "%Y/%j-%H:%M:%S", "%Y%m%dT%H%M%SZ", "%d-%b-%Y %H:%M:%S", "%Y %b %d %H:%M:%S", "%d %B %Y %H:%M:%S",
+        "%Y-%m-%d_%H:%M:%S", "%Y-%m-%d %H:%M:%S GMT", "%Y-%m-%dT%H:%M:%S.%f+0000",
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("heading", ["time [utc]", "Timestamp", "UTC", "time_utc", "datetime [iso8601]"])
+def test_law_dates_as_programs_write_them(tmp_path, pattern, heading):
+    stamps = [(datetime.datetime(2023, 8, 11, 10) + datetime.timedelta(seconds=k)).strftime(pattern) for k in range(3)]
+    t = loaded(tmp_path, f"{heading},body_rate_x [deg/sec]\n" + "".join(f"{s},{k}\n" for k, s in enumerate(stamps)))
+    assert (t.channels["body_rate_x"].tai_ns == ZERO + np.arange(3) * NS).all()
+
+
+@pytest.mark.parametrize(
+    "stamp", ["08/11/2023 10:00:00", "20230811", "2023-08-11+02:00", "11-Xyz-2023 10:00:00", "2023-13-01T00:00:00"]
+)
+def test_dates_that_may_mean_two_things_are_refused(tmp_path, stamp):
+    with pytest.raises(BadInput):
+        loaded(tmp_path, f"time [utc],body_rate_x [rad/s]\n{stamp},1\n")
+
+
+@pytest.mark.parametrize("word", ["N/A", "-", "#N/A", "null", "None", "#DIV/0!", "<NA>", "1.#QNAN", "nan"])
+def test_law_words_for_no_value_are_blanks_and_told(tmp_path, word):
+    t = loaded(tmp_path, f"time [s],body_rate_x [rad/s]\n0,1\n1,{word}\n2,3\n")
+    assert t.channels["body_rate_x"].values.tolist() == [1, 3] and [f.what for f in t.findings][:1] == ["nan"]
+
+
+def test_law_forms_of_spreadsheets_and_programs(tmp_path):
+    rows = [(0, 1.5), (1, -2.5), (2, 3.5)]
+    plain = "time [s],body_rate_x [deg/s]\n" + "".join(f"{t},{v}\n" for t, v in rows)
+    said = loaded(tmp_path, plain).channels["body_rate_x"].values
+    forms = {
+        "index": ",time [s],body_rate_x [deg/s]\n" + "".join(f"{k},{t},{v}\n" for k, (t, v) in enumerate(rows)),
+        "blanks": "  time [s]   body_rate_x [deg/s]\n" + "".join(f"   {t}     {v}\n" for t, v in rows),
+        "spare": "time [s],body_rate_x [deg/s]\n" + "".join(f"{t},{v},\n" for t, v in rows),
+        "minus": plain.replace("-", "\N{MINUS SIGN}"),
+        "fortran": plain.replace("1.5", "1.5D+00").replace("3.5", "0.35d1"),
+        "degree sign": plain.replace("deg", "°"),
+    }
+    for name, content in forms.items():
+        assert loaded(tmp_path, content, name=f"{name}.csv").channels["body_rate_x"].values == pytest.approx(said, rel=1e-15), name  # fmt: skip
+    for encoding in ("latin-1", "utf-16", "utf-16-le"):
+        (tmp_path / "e.csv").write_bytes((forms["degree sign"] + "3,1\n" * (encoding == "x")).encode(encoding))
+        assert load_telemetry(tmp_path / "e.csv").channels["body_rate_x"].values == pytest.approx(said, rel=1e-15), (
+            encoding
+        )

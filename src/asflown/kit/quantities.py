@@ -75,11 +75,10 @@ def _spelled(name: str) -> str:
     """A unit as people spell it, with signs and words as astropy has them."""
 
     def word(found: re.Match) -> str:
-        said = found[0]
-        known = _WORDS.get(said) or (_WORDS.get(said.lower()) if len(said) > 2 else None)
-        return known or (
-            said[:-1].lower() if len(said) > 5 and said.endswith("s") and said.lower() != "celsius" else said
-        )
+        text = found[0]
+        known = _WORDS.get(text) or (_WORDS.get(text.lower()) if len(text) > 2 else None)
+        several = len(text) > 5 and text[-1] == "s" and text.lower() != "celsius"
+        return known or (text[:-1].lower() if several else text)
 
     plain = re.sub(r"(?<=[A-Za-z])-(?=[A-Za-z])", " ", name.translate(_SIGNS))  # N-m
     return _WRITTEN.get(plain.replace(" ", "")) or re.sub(r"[A-Za-z]{1,20}", word, plain)

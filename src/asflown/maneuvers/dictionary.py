@@ -78,7 +78,9 @@ def _check(entry: ManeuverDictionary) -> None:
     for c in entry.column:
         if c.name not in NUMBERS and c.name not in WORDS and c.name != "time":
             raise BadInput(
-                f"{c.name!r} is not a column of a maneuver table", channel=c.name, remedy="docs/maneuvers.md lists the columns."
+                f"{c.name!r} is not a column of a maneuver table",
+                channel=c.name,
+                remedy="docs/maneuvers.md lists the columns.",
             )
         if c.variance and not c.name.startswith("sigma_"):
             raise BadInput("variance = true is for sigmas", channel=c.name, remedy="Map a sigma, or leave it out.")
@@ -136,7 +138,9 @@ def _words(table: Table, column: int) -> list[str]:
     return found
 
 
-def _numbers(table: Table, c: ColumnEntry, at: dict[str, int], dv: np.ndarray | None, reasons: Sequence[str]) -> np.ndarray:
+def _numbers(
+    table: Table, c: ColumnEntry, at: dict[str, int], dv: np.ndarray | None, reasons: Sequence[str]
+) -> np.ndarray:
     """A column in SI, NaN where blank, (N,)."""
     rows, values, _ = numbers_of(table, at[c.column], c.name)
     units = _words(table, at[c.unit_column]) if c.unit_column else [c.unit] * len(table)
@@ -174,4 +178,6 @@ def _factor(name: str, unit: str) -> tuple[float, bool]:
         return si_factor(unit, kind), True
     except BadInput:
         wanted = "a velocity or %" if kind == "" else "a velocity or an angle"
-        raise BadInput(f"the unit [{unit}] of {name} is neither {wanted}", channel=name, remedy="Correct unit.") from None
+        raise BadInput(
+            f"the unit [{unit}] of {name} is neither {wanted}", channel=name, remedy="Correct unit."
+        ) from None

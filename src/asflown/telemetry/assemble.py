@@ -164,7 +164,7 @@ def time_column(table: Table | TextFile) -> tuple[int, Scale]:
 #: What a column of times is called, and the scale that this says.
 _TIMES = {
     "time": "", "timestamp": "", "t": "", "datetime": "", "date time": "", "utc": "utc", "time utc": "utc", "utc time": "utc",
-    "timestamp utc": "utc",
+    "timestamp utc": "utc", "time s": "s", "time ms": "ms",
 }  # fmt: skip
 #: What a column of row numbers is called, as spreadsheets and pandas write it.
 _ROW_NUMBERS = ("", "index", "unnamed: 0", "row", "#")

@@ -98,9 +98,7 @@ def tables_of_dataset(groups: list) -> list[Table]:
             clock = _clock(data, dim)
             flags = {f"valid_{n}" for n in data.variables}  # as Telemetry.to_xarray writes them
             others = [
-                n
-                for n, v in data.variables.items()
-                if dim in v.dims and n != clock and v.ndim <= 2 and n not in flags
+                n for n, v in data.variables.items() if dim in v.dims and n != clock and v.ndim <= 2 and n not in flags
             ]
             if clock is not None and others:
                 tables.append(_coordinate_table(data, clock, others))

@@ -11,6 +11,7 @@ import numpy as np
 from ..kit.errors import BadInput
 from .formats import tables_of_dataset
 from .tables import Table, checked, typed
+from .times import is_stamp
 
 
 def tables_of(data: Any) -> list[Table]:
@@ -85,7 +86,8 @@ def _of_frame(data: Any) -> Table:
     for j, column in enumerate(columns):
         if isinstance(column, np.ndarray) and column.dtype.kind == "m":  # elapsed times
             headings[j], columns[j] = f"{headings[j]} [ns]", column.astype("timedelta64[ns]").astype(np.int64)
-    return checked(Table(tuple(headings), tuple(columns)))
+    said = str(getattr(data, "attrs", {}).get("epoch", ""))  # as Telemetry.to_pandas writes it
+    return checked(Table(tuple(headings), tuple(columns), epoch=said if is_stamp(said) else None))
 
 
 def _values(series: Any) -> np.ndarray:

@@ -761,7 +761,10 @@ def _turns_at_zero(c: Channel) -> bool:
     (down, at_down), (up, at_up) = (np.polyfit(t[side], x[side], 1) for side in sides)
     sigma = max(noise, 1e-9 * float(np.max(x))) * np.sqrt(12 / n**3)  # of a slope
     return bool(
-        down < -20 * sigma and up > 20 * sigma and abs(up + down) < 0.2 * up and abs(at_down / down - at_up / up) < 3 + 0.1 * n
+        down < -20 * sigma
+        and up > 20 * sigma
+        and abs(up + down) < 0.2 * up
+        and abs(at_down / down - at_up / up) < 3 + 0.1 * n
     )
 
 
