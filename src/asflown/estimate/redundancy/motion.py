@@ -62,6 +62,7 @@ class Motion:
 
     def gained(self) -> np.ndarray:
         """Rate of each wheel's momentum (N, n, 3). [N m]"""
+        assert self.stored is not None
         return _slope(self.stored, self.blocks, self.grid.step_s)
 
 

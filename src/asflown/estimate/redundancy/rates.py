@@ -212,7 +212,7 @@ def lag(motion: Motion, x: np.ndarray, y: np.ndarray) -> float | None:
     step = motion.grid.step_s
     most = min(round(LATEST_S / step), len(x) // 4)
     shifts = np.arange(-most, most + 1)
-    r = np.array([_correlation(x, y, k) for k in shifts])
+    r = np.array([_correlation(x, y, int(k)) for k in shifts])
     best = int(np.argmax(r))
     own, left = max(1 - max(r[most], 0.0) ** 2, 1e-12), max(1 - r[best] ** 2, 1e-12)
     late = float(shifts[best] * step)
