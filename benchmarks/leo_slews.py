@@ -1,6 +1,6 @@
 """How well `asflown inertia` finds the tensor of simulated flights of `leo-slews`: pulls and coverage of the six elements.
 
-Run: python benchmarks/leo_slews.py [--flights 100] [--first 0] [--out flights.jsonl].  About 8 s a flight and core.
+Run: python benchmarks/leo_slews.py [--flights 100] [--first 0] [--out flights.jsonl].  About 10 s a flight and core.
 
 Every flight has its own inertia (one sigma of the craft file's), orbit, dipole, levers, density and a controller that believes another
 inertia and runs at another bandwidth, drawn as for sources_accuracy.py; every fourth flies through NRLMSIS.  Wheels stick and rub as the
