@@ -86,7 +86,9 @@ def test_law_the_backward_pass_gives_the_slopes_in_what_shapes_a_step():
     for t in range(2):
         driven = np.concatenate([s.driven, dQ[t : t + 1]])
         moved = [
-            replace(s, A=s.A + x * dA[t, s.kind], driven=driven, scale=np.column_stack([s.scale, np.full(len(s.kind), x)]))
+            replace(
+                s, A=s.A + x * dA[t, s.kind], driven=driven, scale=np.column_stack([s.scale, np.full(len(s.kind), x)])
+            )
             for x in (-h, h)
         ]
         low, high = (run(m).log_likelihood(beta) for m in moved)

@@ -268,7 +268,9 @@ def _backward(
                 t, i, c = turns[d, 0], turns[d, 1], turns[d, 2]
                 total = 0.0
                 for f in range(len(entries)):
-                    total += S[i, entries[f, 0]] * A[k, entries[f, 0], entries[f, 1]] * afterwards[k - 1, entries[f, 1], c]
+                    total += (
+                        S[i, entries[f, 0]] * A[k, entries[f, 0], entries[f, 1]] * afterwards[k - 1, entries[f, 1], c]
+                    )
                 by_change[t] -= dA[t, kind[k], i, c] * total
             adjoint[k] = r
             before[:] = 0.0

@@ -1,5 +1,7 @@
 """Table 1 of 001, all of it, and what a comparison says of an estimate."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -94,6 +96,18 @@ def test_a_units_factor_is_doubted(factor, words):
     assert len(said) == bool(words) and all(w in said[0].about["guesses"] for w in words)
     lopsided = factor * p.inertia_kgm2 * np.diag([1, 3, 1]) if factor != 1.1 else p.inertia_kgm2
     assert not compare_inertia(lopsided, p).doubts.has(doubt.WRONG_UNIT)
+
+
+def test_moments_far_from_the_prediction_are_doubted_by_its_own_sigma():
+    p = predicted_inertia(CASSINI, None)  # known to 5 %
+    I_B = p.inertia_kgm2
+    assert compare_inertia(1.3 * I_B, p).doubts.has(doubt.OFF_SCALE)
+    assert not compare_inertia(1.2 * I_B, p).doubts.has(doubt.OFF_SCALE)
+    assert compare_inertia(1.2 * I_B, replace(p, share=0.03)).doubts.has(doubt.OFF_SCALE)
+    one = I_B * np.where(np.eye(3) * [1, 0, 0], 1.3, 1.0)
+    assert compare_inertia(one, p).doubts.of(doubt.FAR_FROM_PREDICTION).about(element="Ixx")
+    loose = 0.1 * np.abs(I_B)
+    assert not compare_inertia(one, p, sigma=loose).doubts.has(doubt.FAR_FROM_PREDICTION)
 
 
 def test_a_tensor_no_body_has_is_doubted():

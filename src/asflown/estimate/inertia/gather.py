@@ -107,7 +107,7 @@ def slew_record(subject: Subject) -> SlewRecord:
         zero_s=reader.zero_s, momentum=momentum, rates=rates, attitude=attitude, arcs=tuple(arcs), wheels=held.names,
         axes=held.axes, spins=held.spins, swings=() if subject.relative else swings_of(subject.craft), relative=subject.relative, counts=counts, doubts=Doubts(found),
     )  # fmt: skip
-    return with_orbit(made, subject.telemetry, reader.start_ns, subject.inertia_kgm2)
+    return with_orbit(made, subject.telemetry, reader.start_ns, subject.inertia_kgm2, subject.craft.craft)
 
 
 def check_wheels(subject: Subject) -> None:

@@ -12,6 +12,7 @@ from ..environment import gravity_words, longest_gap, orbit_in
 from .surroundings import surroundings_of
 
 if TYPE_CHECKING:
+    from ...craft.model import Craft
     from ...telemetry.telemetry import Telemetry
     from .record import SlewRecord
 
@@ -34,7 +35,9 @@ NO_ATTITUDE_FOR_GRAVITY = Kind(
 )  # fmt: skip
 
 
-def with_orbit(record: SlewRecord, telemetry: Telemetry, start_ns: int, I_B: np.ndarray | None) -> SlewRecord:
+def with_orbit(
+    record: SlewRecord, telemetry: Telemetry, start_ns: int, I_B: np.ndarray | None, craft: Craft
+) -> SlewRecord:
     """The record with the orbit that the telemetry has, where it can be used, and doubts about it.
 
     ``start_ns``: the record's start (TAI); ``I_B`` (3, 3): the craft's own tensor, which tells the size of what is left out."""
@@ -54,7 +57,7 @@ def with_orbit(record: SlewRecord, telemetry: Telemetry, start_ns: int, I_B: np.
     gap = longest_gap(orbit, wheels.min(), wheels.max())
     if gap > _GAP * 2 * np.pi * np.sqrt(orbit.nearest_m**3 / orbit.mu):
         return _without(record, *doubts, ORBIT_TOO_SHORT(why=f"{gap:.0f} s without one", left_out=left_out))
-    around = surroundings_of(telemetry, start_ns, orbit)
+    around = surroundings_of(telemetry, start_ns, orbit, craft)
     return replace(record, orbit=orbit, surroundings=around, doubts=record.doubts + doubts)
 
 

@@ -133,7 +133,10 @@ class _Wheels:
             for which in combinations(range(len(names)), count):
                 flipped = self._vectors.copy()
                 flipped[list(which)] *= -1
-                yield f"{'wheel' if count == 1 else 'wheels'} {some_of([names[k] for k in which])} turned the other way", flipped
+                yield (
+                    f"{'wheel' if count == 1 else 'wheels'} {some_of([names[k] for k in which])} turned the other way",
+                    flipped,
+                )
 
     def _orders(self, *, several: bool) -> Iterator[tuple[str, np.ndarray]]:
         names, n = self.record.wheels, len(self.record.wheels)
@@ -152,7 +155,10 @@ class _Wheels:
         for k, name in enumerate(self.record.wheels):
             columns, residual = self.misfit.without(self.columns[:, k]), self.misfit.residual
             change = -np.linalg.lstsq(columns, residual, rcond=_RANK)[0]
-            yield in_words(name, self._vectors[k], self._vectors[k] + change), self.misfit.left(residual + columns @ change)
+            yield (
+                in_words(name, self._vectors[k], self._vectors[k] + change),
+                self.misfit.left(residual + columns @ change),
+            )
 
 
 def per_vector(record: SlewRecord) -> np.ndarray | None:

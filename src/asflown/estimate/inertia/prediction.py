@@ -231,7 +231,9 @@ def predicted_inertia(craft: Craft, tai_ns: int | None) -> Prediction:
     asked = craft.inertia_requirement
     if candidates:
         m = min(candidates, key=lambda m: abs(m.date - moment))
-        return Prediction(tensor(m.elements), "predicted", _day(m.date), m.source, asked, _age(m, moment), m.share or PREDICTED_SHARE)
+        return Prediction(
+            tensor(m.elements), "predicted", _day(m.date), m.source, asked, _age(m, moment), m.share or PREDICTED_SHARE
+        )
     now = craft.at(tai_ns)
     if now.inertia_kgm2 is None:
         raise BadInput(

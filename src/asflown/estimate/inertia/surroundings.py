@@ -18,6 +18,7 @@ from ...telemetry.channels import AXES
 from ..environment import levers
 
 if TYPE_CHECKING:
+    from ...craft.model import Craft
     from ...dynamics.orbit import Orbit
     from ...telemetry.telemetry import Telemetry
 
@@ -31,6 +32,7 @@ class Surroundings:
 
     vectors: dict[str, tuple[np.ndarray, np.ndarray]]
     orbit: Orbit
+    unseen: tuple[str, ...] = ()  # channels that are missing, of what the craft file says acts
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -58,7 +60,7 @@ def orbit_angle(position_N: np.ndarray) -> np.ndarray:
     return np.arctan2(r @ across, r @ r[0])
 
 
-def surroundings_of(telemetry: Telemetry, start_ns: int, orbit: Orbit) -> Surroundings:
+def surroundings_of(telemetry: Telemetry, start_ns: int, orbit: Orbit, craft: Craft) -> Surroundings:
     """Those of which the telemetry has the vector."""
     vectors = {}
     for name, stem in _SOURCES:
@@ -68,4 +70,6 @@ def surroundings_of(telemetry: Telemetry, start_ns: int, orbit: Orbit) -> Surrou
         size = float(np.sqrt(np.mean(np.sum(u**2, axis=1)))) if len(tai_ns) >= _FEWEST else 0.0
         if size > 0:
             vectors[name] = (tai_ns - start_ns) / 1e9, u / size
-    return Surroundings(vectors, orbit)
+    described = {"dipole": craft.magnetics is not None, "sunlight": craft.sunlight is not None}
+    unseen = tuple(f"{stem}_x, _y, _z" for name, stem in _SOURCES if described[name] and name not in vectors)
+    return Surroundings(vectors, orbit, unseen)

@@ -63,6 +63,12 @@ SLOW_BY_SAMPLES = Kind(
     "{off:.2g} ({element})",
     "Use --method consistent.",
 )  # fmt: skip
+SOURCES_UNSEEN = Kind(
+    "inertia.sources-unseen", Severity.SUSPECT,
+    "the craft file says that residual dipole or sunlight act, and there is no {channels}: method gls has no term for their torque, and its "
+    "sigma takes what is left over for white noise",
+    "Use --method consistent, which fits a slow torque, or add the channels.",
+)  # fmt: skip
 WHEEL_MISREAD = Kind(
     "inertia.wheel-misread", Severity.SUSPECT,
     "momentum would be conserved better (chi square {square:.0f} of 3) if {words}: {element} would move by {moved:+.3g}, {sigmas:.1f} total "
@@ -211,8 +217,11 @@ def _by_samples(subject: Subject, record: SlewRecord, method: str, frame: str) -
 
 def _slow_doubt(record: SlewRecord, rows: Rows, method: str, elements: np.ndarray, frame: str) -> Doubt | None:
     """What slow outside torques do to the elements (6,) of a method without them."""
-    if not record.slow or method == "gls":
+    if not record.slow:
         return None
+    if method == "gls":
+        unseen = () if record.surroundings is None else record.surroundings.unseen
+        return SOURCES_UNSEEN(channels=unseen) if unseen else None
     known = generalized(rows, first_levels(record), record.momentum.unit_covariance(), frame).elements
     off = np.nan_to_num(np.abs(elements - known))
     return SLOW_BY_SAMPLES(method=method, off=float(off.max()), element=ELEMENTS[int(np.argmax(off))])
