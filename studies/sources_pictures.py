@@ -1,4 +1,4 @@
-"""What `asflown sources` tells of a simulated nadir hold, of an orbit of the Space Station and of INSPIRESat-1, drawn.
+"""What `asflown sources` tells of a simulated nadir hold, of an orbit and of twelve hours of the Space Station and of INSPIRESat-1, drawn.
 
 Run: python studies/sources_pictures.py docs/pictures.   Answer, 2026-11: docs/theory/sources.md and docs/flight-data.md.
 """
@@ -15,6 +15,7 @@ DATA = Path(os.environ.get("ASFLOWN_FLIGHT_DATA") or Path(__file__).resolve().pa
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 RECORDINGS = {
     "iss-sources": ("iss/iss_20181012_hours_00_12.csv.gz", "iss", ("4360", "10010")),
+    "iss-sources-twelve-hours": ("iss/iss_20181012_hours_00_12.csv.gz", "iss", (None, None)),
     "inspiresat1-sources": ("inspiresat1/is1_adcs_1hz.csv", "inspiresat1", (None, None)),
 }
 

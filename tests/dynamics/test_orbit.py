@@ -14,6 +14,7 @@ from asflown.dynamics.orbit import (
     EARTH_RADIUS_M,
     J2_EARTH,
     Orbit,
+    bridged,
     check_above_earth,
     flown,
     gravity_at,
@@ -155,3 +156,13 @@ def test_below_the_surface_is_refused(position):
 def test_times_may_come_in_any_order_and_twice():
     r, _ = propagate(*state_of(SimpleNamespace(**ORBIT.model_dump())), [60.0, 0.0, -60.0, 60.0])
     assert np.array_equal(r[0], r[3]) and np.array_equal(r[1], state_of(ORBIT)[0])
+
+
+def test_recovery_of_the_way_through_a_gap():
+    t = np.arange(0.0, 5600.0, 10.0)
+    r, _ = propagate([6.878e6, 0, 0], [0, 950.0, 7553.0], t)
+    there = (t < 1000) | (t > 2500)
+    whole, lengths = bridged(Orbit(t[there], np.round(r[there])), 3000.0)
+    assert lengths == [1520.0]
+    assert np.linalg.norm(whole.at(t) - r, axis=1).max() < 10.0
+    assert bridged(Orbit(t[there], r[there]), 1000.0)[1] == []

@@ -32,7 +32,7 @@ def sources(
     sources: str = typer.Option(
         None,
         "--sources",
-        help="Those looked for, of dipole,sunlight,drag,constant; by default all whose vectors are known, the constant where needed.",
+        help="Those looked for, of dipole,sunlight,drag,constant; by default all whose vectors are known, the constant torque averaged over its size.",
     ),
     without: str = typer.Option(None, "--without", help='Those left out, as in "constant,drag".'),
     air: str = AIR,

@@ -246,7 +246,7 @@ def _dipole(craft: Craft, field: Seen | None, missing: str) -> Term | str:
     torque = errors = None
     if craft.magnetics is not None:
         torque, errors = design @ craft.magnetics.residual_dipole_Am2, design * craft.magnetics.sigma_Am2
-    return Term("dipole", AXES, "A m2", design, field.source, torque, errors)
+    return Term("dipole", AXES, "A m2", design, field.source, torque, errors, measured=field.measured)
 
 
 def _drag(craft: Craft, place: Place, air: Air | None, why: str) -> Term | str:

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 _FEWEST = 8
 #: Beyond it the measured Sun does not stand still. [rad]  A coarse sun sensor errs by a few degrees.
 _SUN_OFF = np.radians(15)
-#: The body turns where the Sun moves through it by this. [rad]
-_TURNED = np.radians(60)
+#: The body turns where the Sun moves through it by this (rms) [rad], and the Sun stands still where it wanders by less than a share of it.
+_MOVED, _STILL = np.radians(8), 0.25
 #: Shadow by the sun sensor and by geometry may differ for so long at an edge. [s]
 _EDGE_S = 60.0
 #: Longest stretch over which the Sun stands still: it moves by 1 degree a day. [s]
@@ -98,6 +98,8 @@ class Seen:
     u_B: np.ndarray
     source: str
     share: np.ndarray
+    measured: bool = False
+    wander_rad: float = 0.0  # rms, of a measured Sun in inertial axes
 
 
 def attitude_at(telemetry: Telemetry, tai_ns: np.ndarray) -> np.ndarray | None:
@@ -117,7 +119,7 @@ def field_at_craft(telemetry: Telemetry, place: Place) -> tuple[Seen | None, str
     found = _channel(telemetry, "magnetic_field")
     if found is not None:
         u = _between(*found, place.tai_ns)
-        return Seen(u, "field from the magnetometer", np.ones(len(u))), ""
+        return Seen(u, "field from the magnetometer", np.ones(len(u)), measured=True), ""
     model = _igrf(place)
     if isinstance(model, str):
         return None, f"magnetic_field_x, _y, _z ({model})"
@@ -156,10 +158,10 @@ def sun_at_craft(telemetry: Telemetry, place: Place) -> tuple[Seen | None, str, 
     whole = "Sun and shadow from the sun sensor"
     if place.R_NB is None:
         return Seen(_unit(_between(t_on, s_on, place.tai_ns)), whole, lit), "", []
-    sun_N, doubts = _steady_sun(telemetry, t_on, s_on, place)
+    sun_N, doubts, wander = _steady_sun(telemetry, t_on, s_on, place)
     if place.at_earth:
         lit, whole = _shadow(sun_N, lit, whole, place)
-    return Seen(place.to_body(sun_N), whole, lit), "", doubts
+    return Seen(place.to_body(sun_N), whole, lit, measured=True, wander_rad=wander), "", doubts
 
 
 def believed_sun(sun: Seen | None, own: list[Doubt], apart: Doubts) -> list[Doubt]:
@@ -171,7 +173,8 @@ def believed_sun(sun: Seen | None, own: list[Doubt], apart: Doubts) -> list[Doub
     if sun is None or own or not elsewhere:
         return [*own, *apart]
     seen = sun.u_B[sun.share > 0.5]
-    if not len(seen) or float(_angle(seen, seen[:1]).max()) < _TURNED:
+    moved = float(np.sqrt(np.mean(_angle(seen, seen.mean(axis=0)[None]) ** 2))) if len(seen) else 0.0
+    if moved < _MOVED or sun.wander_rad > _STILL * moved:
         return [*own, *apart]
     return [SUN_OF_ANOTHER_DATE(off_deg=d.numbers["off_deg"]) for d in elsewhere]
 
@@ -184,8 +187,11 @@ def _modelled_sun(place: Place) -> np.ndarray | str:
     return sun_direction(place.tai_s)
 
 
-def _steady_sun(telemetry: Telemetry, t: np.ndarray, s_B: np.ndarray, place: Place) -> tuple[np.ndarray, list[Doubt]]:
-    """The measured Sun in inertial axes at the instants of ``place``, (N, 3): means of hours, which have hardly any noise."""
+def _steady_sun(
+    telemetry: Telemetry, t: np.ndarray, s_B: np.ndarray, place: Place
+) -> tuple[np.ndarray, list[Doubt], float]:
+    """The measured Sun in inertial axes at the instants of ``place``, (N, 3): means of hours, which have hardly any noise; doubts; and by
+    how much it wanders, rms [rad]."""
     R = attitude_at(telemetry, t)
     assert R is not None
     s_N = np.einsum("nij,nj->ni", R, s_B)
@@ -197,7 +203,7 @@ def _steady_sun(telemetry: Telemetry, t: np.ndarray, s_B: np.ndarray, place: Pla
         np.sqrt(np.mean(np.concatenate([_angle(s_N[p], m[None]) ** 2 for p, m in zip(parts, means, strict=True)])))
     )
     doubts: list[Doubt] = [SUN_TURNS(off_deg=float(np.degrees(off)))] if off > _SUN_OFF else []
-    return _unit(_between(middles, means, place.tai_ns)), doubts
+    return _unit(_between(middles, means, place.tai_ns)), doubts, off
 
 
 def _shadow(sun_N: np.ndarray, lit: np.ndarray, whole: str, place: Place) -> tuple[np.ndarray, str]:

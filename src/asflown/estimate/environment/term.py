@@ -28,6 +28,8 @@ class Term:
     errors_Nm : ndarray, shape (N, 3, q)
         How one sigma of each of q independent errors changes that torque: of the constants, of the density, ...
         The torque's variance is the sum of their squares.
+    measured : bool
+        Whether its vectors are from a channel, not from a model.
     """
 
     name: str
@@ -37,6 +39,7 @@ class Term:
     source: str
     torque_Nm: np.ndarray | None = None
     errors_Nm: np.ndarray | None = None
+    measured: bool = False
 
     @property
     def sigma_Nm(self) -> np.ndarray:

@@ -61,6 +61,12 @@ SIMPLER = Kind(
 NO_SOURCE = Kind(
     "sources.left-out", Severity.NOTE, "{source} is not looked for: it needs {needs}", "Add these.",
 )  # fmt: skip
+FACETS = Kind(
+    "sources.facets", Severity.NOTE,
+    "the craft file has facets for {source}: they are not fitted, one lever stands for them, which serves while the direction in the body "
+    "changes little",
+    "asflown torque --with takes the facets as they are described.",
+)  # fmt: skip
 OWN_HARMONICS = Kind(
     "sources.own-harmonics", Severity.CAUTION,
     "what swings with two and more times the orbit's rate does so about each axis by itself: that is no density alone (arrays that turn, "

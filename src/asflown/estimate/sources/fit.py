@@ -12,8 +12,8 @@ from ...kit.result import recorded
 from ..environment import misread_wheels
 from ..subject import PER_SPIN_INERTIA, actuators, subject_of
 from .compare import Model, compare
-from .doubts import NO_CONSTANT, NO_SOURCE, fit_doubts
-from .gather import ALONE, DENSITY, Arc, gather, with_harmonics
+from .doubts import FACETS, NO_CONSTANT, NO_SOURCE, fit_doubts
+from .gather import ALONE, DENSITY, FIELD_BIAS, Arc, gather, with_field_bias, with_harmonics
 from .residual import residual_of
 from .result import Fitted, SourcesResult
 from .swing import Averaged, Posterior, averaged, posterior
@@ -99,19 +99,32 @@ def sources(
 
 def _whitened(arc: Arc, fitted: tuple[str, ...], *, modelled: bool) -> Whitened:
     """With higher harmonics of drag, whichever are likelier: the density's, common to the axes and following the lever found, or such
-    of each axis' own, where what swings with the orbit is not the density alone (arrays that turn)."""
+    of each axis' own, where what swings with the orbit is not the density alone (arrays that turn).  With the bias of a magnetometer."""
+    least = tuple(n for n in fitted if n != "constant")
     if "drag" not in fitted:
-        return whitened(arc)
+        white = whitened(arc)
+        biased = _with_bias(white, arc, least)
+        return white if biased is arc else whitened(biased, white.levels)
     drag = arc.of("drag")
     per_lever = arc.torque[:, :, drag]
     # a lever as large as the torque that is seen, until one is known
     white = best = whitened(with_harmonics(arc, per_lever / ALONE, modelled=modelled))
-    least = tuple(n for n in fitted if n != "constant")
+    arc = _with_bias(white, arc, least)
     for _ in range(_ROUNDS):
-        lever = posterior(white, least, _CELLS).whole(white)[: len(drag)][drag]
+        lever = posterior(white, least, _CELLS).whole(white)[np.flatnonzero(drag)]
         white = whitened(with_harmonics(arc, (per_lever @ lever)[:, :, None], modelled=modelled), white.levels)
         best = min(best, white, key=lambda w: w.cost)
     return best
+
+
+def _with_bias(white: Whitened, arc: Arc, sources: tuple[str, ...]) -> Arc:
+    """The arc with the bias of its magnetometer, where one is used, by the dipole that is found without."""
+    term = arc.environment.term("dipole")
+    if "dipole" not in sources or term is None or not term.measured:
+        return arc
+    at = np.flatnonzero(arc.of("dipole"))
+    dipole = posterior(white, sources, _CELLS).whole(white)[at] * [arc.columns[c].sigma for c in at]
+    return with_field_bias(arc, dipole)
 
 
 def _result(
@@ -129,7 +142,7 @@ def _result(
     left_out = {n: w for n, w in around.left_out.items() if n in asked or n == "gravity-gradient"}
     doubts = [
         *subject.doubts, *arc.doubts, *(NO_SOURCE(source=n, needs=w) for n, w in left_out.items()), *_constant(average, arc),
-        _misread(subject, arc),
+        _misread(subject, arc), _of_facets(subject, fitted),
         *fit_doubts(white, theta, residual, models, shown, relative=subject.relative),
         PER_SPIN_INERTIA(what="the torque is") if subject.relative else None,
     ]  # fmt: skip
@@ -184,6 +197,13 @@ def _misread(subject: Subject, arc: Arc) -> Doubt | None:
     return misread_wheels(arc.momentum, arc.Z, each, np.array([d for _, d in stored]), names)
 
 
+def _of_facets(subject: Subject, fitted: tuple[str, ...]) -> Doubt | None:
+    craft = subject.craft.craft
+    given = {"sunlight": craft.sunlight, "drag": craft.aerodynamics}
+    on = [n for n in fitted if getattr(given.get(n), "facets", ())]
+    return FACETS(source=on) if on else None
+
+
 def _told(arc: Arc, found: Posterior) -> dict[int, Told]:
     """Every unknown that is looked for, by its column in the arc: place in the posterior, and whether the data tell it."""
     left = np.sqrt(np.diag(found.spread))
@@ -235,6 +255,8 @@ def _contributions(arc: Arc, theta: np.ndarray, fitted: tuple[str, ...]) -> dict
         use = arc.of(name) | arc.of(f"{name} cos") | arc.of(f"{name} sin")
         if name == "drag":
             use |= np.array([c.name.startswith(DENSITY) for c in arc.columns])
+        if name == "dipole":
+            use |= np.array([c.name.startswith(FIELD_BIAS) for c in arc.columns])
         made[name] = arc.torque[:, :, use] @ theta[use]
     for name, columns in (
         ("gravity-gradient", arc.of("inertia")),

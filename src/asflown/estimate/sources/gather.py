@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 _BLOCKS, _SHORTEST_S = 600, 2.0
 #: What columns of the density's higher harmonics are called.
 DENSITY = "density"
+#: What columns of the magnetometer's bias are called, and one sigma of it, of a calibrated one: assumed. [T]
+FIELD_BIAS, _FIELD_BIAS_T = "field bias", 3e-7
 #: What columns of the wheels' spin inertia are called.
 SPIN = "spin inertia"
 #: A stretch without samples after which the momentum starts anew. [s]
@@ -181,6 +183,18 @@ def with_harmonics(arc: Arc, drag: np.ndarray, *, modelled: bool) -> Arc:
     Z = np.concatenate([arc.Z, np.swapaxes(arc.turn, 1, 2) @ grown], axis=2)
     whole = np.concatenate([arc.torque, torque], axis=2)
     return replace(arc, Z=Z, columns=(*arc.columns, *columns), torque=whole, own_harmonics=drag.shape[2] > 1)
+
+
+def with_field_bias(arc: Arc, dipole: np.ndarray) -> Arc:
+    """The arc with the magnetometer's bias among its unknowns, of a craft whose ``dipole`` (3,) is about so large [A m2].
+
+    A bias b is no field: it makes a torque dipole x b in the model that is not there, constant in body axes."""
+    K = len(arc.time_s)
+    torque = np.broadcast_to(_FIELD_BIAS_T * np.cross(dipole, np.eye(3)).T, (K, 3, 3))
+    grown = cumulative_trapezoid(arc.turn @ torque, arc.time_s, axis=0, initial=0)
+    columns = tuple(Column("", f"{FIELD_BIAS} {a}", "T", _FIELD_BIAS_T) for a in AXES)
+    Z = np.concatenate([arc.Z, np.swapaxes(arc.turn, 1, 2) @ grown], axis=2)
+    return replace(arc, Z=Z, columns=(*arc.columns, *columns), torque=np.concatenate([arc.torque, torque], axis=2))
 
 
 class _Means:
