@@ -204,6 +204,14 @@ class AxisData:
         out = respond(lines, self.model, self.data, body.torque, body.slope, columns)
         return out[:, 0] if torque.ndim == 1 else out
 
+    def moved(self, torque_Nm: np.ndarray) -> np.ndarray:
+        """States (N, n), at the instants of the pass, of a craft at rest driven by a torque (N,) [N m]."""
+        body, model, (N, n) = self.body, self.model, (len(self.times.seconds), self.body.states)
+        read = Measurements(n * np.arange(N + 1), np.tile(np.arange(n), N), np.zeros(n * N))
+        seen = replace(model, H=np.eye(n))
+        column = np.asarray(torque_Nm, float)[:, None] / body.inertia_kgm2
+        return respond(body.lines(self.levels, self.times), seen, read, body.torque, body.slope, column).reshape(N, n)
+
     def without(self, torque_Nm: np.ndarray) -> AxisData:
         """The same less what a known torque (N,), at the instants of the pass, does."""
         return replace(self, data=replace(self.data, value=self.data.value - self.response(torque_Nm)))

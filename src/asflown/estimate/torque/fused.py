@@ -10,6 +10,7 @@ from ..fused import CONSIDERED, LOOPS, PRIORS, fused
 from .answer import Answer, Method
 
 if TYPE_CHECKING:
+    from ..fused import Foreknown
     from ..subject import Subject
 
 
@@ -18,12 +19,13 @@ class Fused(Method):
     """One smoothing of the loop with a torque in it.
 
     ``prior``: edges, matern or wiener; ``loop``: modelled or measured; ``considered``: one sigma of quantities taken as known,
-    by name; see ``estimate.fused.fused`` for what None means."""
+    by name; see ``estimate.fused.fused`` for what None means.  ``foreknown``: torques known beforehand, by instants."""
 
     name: ClassVar[str] = "fused"
     prior: str | None = None
     loop: str | None = None
     considered: dict[str, float] | None = None
+    foreknown: Foreknown | None = None
 
     def __post_init__(self):
         check_choice(self.prior, (None, *PRIORS), "prior")
@@ -38,7 +40,7 @@ class Fused(Method):
 
     def estimate(self, subject: Subject, axes: tuple[int, ...]) -> Answer:
         """Raises CannotFuse where the record lacks what the method needs."""
-        f = fused(subject, axes, prior=self.prior, loop=self.loop, considered=self.considered)
+        f = fused(subject, axes, prior=self.prior, loop=self.loop, considered=self.considered, foreknown=self.foreknown)
         return Answer(
             by=self, grid=f.grid, torque_Nm=f.torque_Nm, sigma_Nm=f.sigma_Nm, momentum_Nms=f.momentum_Nms,
             settings=f.settings, doubts=f.doubts, paths_Nm=f.paths_Nm, peak_scales=f.peak_scales, evidence=f.evidence,

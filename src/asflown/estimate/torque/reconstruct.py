@@ -14,7 +14,7 @@ from ..subject import PER_SPIN_INERTIA, Subject, subject_of
 from .answer import Answer, Method
 from .choice import method_called
 from .consistency import consistency
-from .known import check_known, without_known
+from .known import check_known, foreknown, with_known, without_known
 from .result import TorqueResult
 from .rods import rods_doubt
 
@@ -89,7 +89,7 @@ def torque(
         Mechanism whose inertia is taken off; 'auto': the one whose angle is seen to move; None: no mechanism moves.
     known : sequence of str
         Torques of the surroundings that are taken off: 'gravity-gradient', 'sunlight', 'dipole', 'drag', 'rods', as the craft file has
-        them; their uncertainty goes into the band.
+        them; their uncertainty goes into the band.  The fused method has them as an input of its fit, pulses of torque rods too.
     air : Air, optional
         F10.7 of the day before, its 81-day mean and Ap for the density of the drag; without it the density falls exponentially.
 
@@ -120,12 +120,16 @@ def torque(
     elif variant != "corrected" or any(v is not None for v in options.values()):
         raise BadInput("a method object has its own options", remedy="Give them to the object: Momentum(window_s=20).")
     names, subject = check_known(known), subject_of(telemetry, craft, moving)
-    result = torque_of(subject, method, axis)
-    return without_known(result, subject, names, air) if names else result
+    if not names:
+        return torque_of(subject, method, axis)
+    if isinstance(method, Fused):
+        fed = replace(method, foreknown=foreknown(subject, names, air))
+        return with_known(torque_of(subject, fed, axis, pulsing="rods" not in names), subject, names, air)
+    return without_known(torque_of(subject, method, axis), subject, names, air)
 
 
-def torque_of(subject: Subject, method: Method, axis: str = "all") -> TorqueResult:
-    """As ``torque``, of a subject that is already there."""
+def torque_of(subject: Subject, method: Method, axis: str = "all", *, pulsing: bool = True) -> TorqueResult:
+    """As ``torque``, of a subject that is already there; ``pulsing``: whether the torque rods' pulses are left to the method."""
     telemetry = subject.telemetry
     axes = (0, 1, 2) if axis == "all" else (AXES.index(axis),)
     try:
@@ -153,11 +157,11 @@ def torque_of(subject: Subject, method: Method, axis: str = "all") -> TorqueResu
         peak_scales=answer.peak_scales,
         evidence=answer.evidence,
         gained=answer.gained,
-        doubts=subject.doubts + answer.doubts + _doubts(subject, answer, relative=relative),
+        doubts=subject.doubts + answer.doubts + _doubts(subject, answer, relative=relative, pulsing=pulsing),
     )
 
 
-def _doubts(subject: Subject, answer: Answer, *, relative: bool) -> Doubts:
+def _doubts(subject: Subject, answer: Answer, *, relative: bool, pulsing: bool) -> Doubts:
     """Those of the record as a whole."""
     found: list[Doubt] = []
     if _nothing_changes(subject.telemetry):
@@ -166,7 +170,8 @@ def _doubts(subject: Subject, answer: Answer, *, relative: bool) -> Doubts:
         found.append(THRUSTERS_FIRE(thrusters=subject.firing))
     if relative:
         found.append(PER_SPIN_INERTIA(what="torque and momentum are"))
-    return Doubts([*found, rods_doubt(subject.telemetry, answer.sigma_Nm), *consistency(subject, answer)])
+    rods = rods_doubt(subject.telemetry, answer.sigma_Nm) if pulsing else None
+    return Doubts([*found, rods, *consistency(subject, answer)])
 
 
 def _nothing_changes(telemetry: Telemetry) -> bool:
