@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from ..estimate.fused import PEAK_REACH_S
 from ..estimate.torque import METHODS, VARIANTS, TorqueResult, torque
 from ..kit.digits import plus_minus, scaled_unit
 from ..kit.doubts import Doubt, Doubts, Kind, Severity, grouped
 from ..kit.errors import BadInput, some_of
+from ..kit.peaks import PEAK_REACH_S
 from ..kit.result import Estimate, inputs_of, recorded
 from ..kit.schema import Annotated, Doc, NotRequired, Number, Numbers, TypedDict
 from ..kit.table import Table

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..estimate.fused import PEAK_REACH_S
 from ..estimate.torque import TorqueResult, best_lag, peak_near
+from ..kit.peaks import PEAK_REACH_S
 from ..telemetry.channels import AXES
 
 #: The cover paper's Tables 3 and 4: unsigned percent errors of T_Hrwa at the six peaks, as printed.

@@ -31,6 +31,8 @@ def _cycles(text):
 
 def _turns(text):
     """A frequency in cycles or in radians a second -> rad/s."""
+    if str(text).rstrip().endswith(" Hz"):  # the usual way
+        return 2 * np.pi * quantity(text, "Hz")
     try:
         return quantity(text, "rad/s")
     except BadInput as why:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import linalg, signal
+import scipy
 
 if TYPE_CHECKING:
     from ..craft.model import WheelController
@@ -85,18 +85,18 @@ def hankel_order_two(controller: WheelController) -> SecondOrder:
     Those equations are not in the transcription; recomputed here.  The truncated numerator has a
     term in s, -0.0117 s against 1.125: a zero at 97 rad/s, dropped."""
     _, A, B, C = _balanced(controller)
-    num, den = signal.ss2tf(A[:2, :2], B[:2], C[:, :2], np.zeros((1, 1)))
+    num, den = scipy.signal.ss2tf(A[:2, :2], B[:2], C[:, :2], np.zeros((1, 1)))
     return SecondOrder(float(num[0, 2]), float(den[1]), float(den[2]))
 
 
 def _balanced(controller: WheelController):
     num, den = error_per_torque(controller, 1.0)
-    A, B, C, _ = signal.tf2ss(-num, den)
+    A, B, C, _ = scipy.signal.tf2ss(-num, den)
     # a companion form is badly scaled: balance it before the Gramians
-    scaled, T = linalg.matrix_balance(A, permute=False)
+    scaled, T = scipy.linalg.matrix_balance(A, permute=False)
     A, B, C = scaled, np.linalg.solve(T, B), C @ T
-    Lc = _root(linalg.solve_continuous_lyapunov(A, -B @ B.T))
-    Lo = _root(linalg.solve_continuous_lyapunov(A.T, -C.T @ C))
+    Lc = _root(scipy.linalg.solve_continuous_lyapunov(A, -B @ B.T))
+    Lo = _root(scipy.linalg.solve_continuous_lyapunov(A.T, -C.T @ C))
     U, values, Vt = np.linalg.svd(Lo.T @ Lc)
     to = Lc @ Vt.T / np.sqrt(values)
     back = (U / np.sqrt(values)).T @ Lo.T
@@ -108,15 +108,27 @@ def _root(gramian):
     return V * np.sqrt(np.maximum(w, 0))
 
 
+def _sampled_section(section: np.ndarray, step_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Numerator and denominator in 1/z of w^2 / ``section`` for an input that is linear between samples.
+
+    As scipy.signal's cont2discrete with its method "foh", whose package takes longer to load than this takes to write."""
+    A, B, C = np.array([-section[1:], [1.0, 0.0]]), np.array([[1.0], [0.0]]), np.array([[0.0, section[-1]]])
+    whole = np.zeros((4, 4))
+    whole[:2, :2], whole[:2, 2:3], whole[2, 3] = step_s * A, step_s * B, 1.0
+    moved = scipy.linalg.expm(whole)
+    A, held, ramp = moved[:2, :2], moved[:2, 2:3], moved[:2, 3:]
+    B, D = held - ramp + A @ ramp, float((C @ ramp).item())
+    den = np.poly(A)
+    return np.poly(A - B @ C) + (D - 1) * den, den
+
+
 def filtered_rate(controller: WheelController, rate: np.ndarray, step_s: float) -> np.ndarray:
     """F(s) applied to an evenly sampled rate (linear between samples), at rest at its first value."""
     if controller.rate_filter is None:
         return np.array(rate, float)
-    section = filter_section(controller)
-    A, B, C, D = signal.tf2ss([section[-1]], section)
-    Ad, Bd, Cd, Dd, _ = signal.cont2discrete((A, B, C, D), step_s, method="foh")
-    b, a = signal.ss2tf(Ad, Bd, Cd, Dd)
-    out = np.asarray(rate, float)
-    for _ in range(2):
-        out, _state = signal.lfilter(b[0], a, out, zi=signal.lfilter_zi(b[0], a) * out[0])
+    num, den = _sampled_section(filter_section(controller), step_s)
+    out, first = np.array(rate, float), rate[0]
+    banded = np.repeat(den[:, None], len(out), axis=1)
+    for _ in range(2):  # den(1/z) y = num(1/z) u, all samples at once
+        out = first + scipy.linalg.solve_banded((2, 0), banded, np.convolve(num, out - first)[: len(out)])
     return out

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -39,7 +39,7 @@ def through_nodes(time_s: np.ndarray, step_s: float, evaluate: Callable[[np.ndar
     nodes = [_nodes(t, part, step_s) for part in parts]
     known = np.split(evaluate(first[np.concatenate(nodes)]), np.cumsum([len(n) for n in nodes])[:-1])
     joined = [
-        values if len(at) == len(part) else CubicSpline(t[at], values)(t[part])
+        values if len(at) == len(part) else scipy.interpolate.CubicSpline(t[at], values)(t[part])
         for part, at, values in zip(parts, nodes, known, strict=True)
     ]
     return np.concatenate(joined)[back]

@@ -7,8 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation
+import scipy
 
 from ..kit.errors import BadInput
 from ..kit.scatter import difference_sigma
@@ -93,8 +92,8 @@ class Orbit:
     mu: float = MU_EARTH
 
     @cached_property
-    def _curve(self) -> CubicSpline:
-        return CubicSpline(self.time_s, self.position_N)
+    def _curve(self) -> scipy.interpolate.CubicSpline:
+        return scipy.interpolate.CubicSpline(self.time_s, self.position_N)
 
     def at(self, time_s) -> np.ndarray:
         """Position at any instants within the table. (M, 3)"""
@@ -116,7 +115,7 @@ class Orbit:
         s = min((t[-1] - t[0]) / 3, _STEP_S)
         at = np.linspace(t[0] + s, t[-1] - s, _COMPARED)
         r = self.position_N
-        pull = CubicSpline(t, -r / np.linalg.norm(r, axis=1, keepdims=True) ** 3).antiderivative(2)
+        pull = scipy.interpolate.CubicSpline(t, -r / np.linalg.norm(r, axis=1, keepdims=True) ** 3).antiderivative(2)
 
         def second(curve):
             return curve(at + s) - 2 * curve(at) + curve(at - s)
@@ -146,7 +145,7 @@ class Orbit:
     def _turned_back(self) -> np.ndarray:
         """The positions (N, 3) as they are in axes that do not turn, if these turn with the Earth."""
         angle = EARTH_RATE_RAD_S * (self.time_s - self.time_s[0])
-        return Rotation.from_rotvec(angle[:, None] * [0.0, 0.0, 1.0]).apply(self.position_N)
+        return scipy.spatial.transform.Rotation.from_rotvec(angle[:, None] * [0.0, 0.0, 1.0]).apply(self.position_N)
 
 
 #: What positions are taken for by mistake: their scale in metres, and whether the axes turn with the Earth.
@@ -243,7 +242,9 @@ def state_of(elements: OrbitElements, mu: float = MU_EARTH) -> tuple[np.ndarray,
     b = a * np.sqrt(1 - e * e)
     rate = np.sqrt(mu / a**3) / (1 - e * np.cos(E))
     plane = np.array([[a * (np.cos(E) - e), b * np.sin(E), 0.0], [-a * rate * np.sin(E), b * rate * np.cos(E), 0.0]])
-    turn = Rotation.from_euler("ZXZ", [elements.ascending_node, elements.inclination, elements.argument_of_perigee])
+    turn = scipy.spatial.transform.Rotation.from_euler(
+        "ZXZ", [elements.ascending_node, elements.inclination, elements.argument_of_perigee]
+    )
     position, velocity = turn.apply(plane)
     return position, velocity
 

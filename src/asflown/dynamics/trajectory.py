@@ -10,8 +10,7 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
-from scipy.optimize import minimize_scalar
+import scipy
 
 from ..kit.doubts import Doubts, Kind, Severity
 from ..kit.errors import BadInput
@@ -86,7 +85,11 @@ class Trajectory(Flyby):
         """When the distance is least, after the closest approach that time counts from. [s]"""
         k = int(np.argmin(np.linalg.norm(self.position_m, axis=1)))
         low, high = self.time_s[max(k - 1, 0)], self.time_s[min(k + 1, len(self.time_s) - 1)]
-        return float(minimize_scalar(self.distance, bounds=(low, high), method="bounded", options={"xatol": 1e-3}).x)
+        return float(
+            scipy.optimize.minimize_scalar(
+                self.distance, bounds=(low, high), method="bounded", options={"xatol": 1e-3}
+            ).x
+        )
 
     @property
     def doubts(self) -> Doubts:
@@ -100,8 +103,8 @@ class Trajectory(Flyby):
         return Doubts(found)
 
     @cached_property
-    def _spline(self) -> CubicHermiteSpline:
-        return CubicHermiteSpline(self.time_s, self.position_m, self.velocity_m_s)
+    def _spline(self) -> scipy.interpolate.CubicHermiteSpline:
+        return scipy.interpolate.CubicHermiteSpline(self.time_s, self.position_m, self.velocity_m_s)
 
     def place(self, time_s) -> np.ndarray:
         """Position in axes fixed to the body. (..., 3) [m]"""

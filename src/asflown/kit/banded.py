@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_solve_banded, cholesky_banded
+import scipy
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class Covariance:
                 if r >= c:
                     full[r - c, c::d] = main[:, r, c]
                 full[d + r - c, c : (K - 1) * d : d] = off[:, r, c]
-        factor = cholesky_banded(full, lower=True)
+        factor = scipy.linalg.cholesky_banded(full, lower=True)
         return cls(factor, full[0].copy())
 
     def solve(self, columns) -> np.ndarray:
         """C^-1 times columns (K d, m)."""
-        return cho_solve_banded((self.factor, True), columns)
+        return scipy.linalg.cho_solve_banded((self.factor, True), columns)

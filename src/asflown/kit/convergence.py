@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
+import scipy
 
 
 class Convergence(NamedTuple):
@@ -45,7 +45,7 @@ def _normal(chains: np.ndarray) -> np.ndarray:
     """Normal scores of the ranks."""
     _, which, counts = np.unique(chains, return_inverse=True, return_counts=True)
     rank = (np.cumsum(counts) - (counts - 1) / 2)[which].reshape(chains.shape)  # equal draws share their mean rank
-    return ndtri((rank - 0.375) / (chains.size + 0.25))
+    return scipy.special.ndtri((rank - 0.375) / (chains.size + 0.25))
 
 
 def _r_hat(chains: np.ndarray) -> float:

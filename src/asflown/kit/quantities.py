@@ -80,11 +80,14 @@ _COMMON = {
     ("arcsec", "rad"): 3.141592653589793 / 648_000, ("ms", "s"): 1e-3, ("min", "s"): 60.0, ("h", "s"): 3600.0, ("mN m", "N m"): 1e-3,
     ("uN m", "N m"): 1e-6, ("mN", "N"): 1e-3, ("km", "m"): 1e3, ("mm", "m"): 1e-3, ("cm", "m"): 1e-2, ("km/s", "m/s"): 1e3,
     ("mm/s", "m/s"): 1e-3, ("nT", "T"): 1e-9, ("uT", "T"): 1e-6, ("mA", "A"): 1e-3, ("kPa", "Pa"): 1e3, ("mHz", "Hz"): 1e-3,
+    ("%", ""): 1e-2, ("mrad/s2", "rad/s2"): 1e-3, ("kg/m3", "kg / m3"): 1.0, ("cm/s", "m/s"): 1e-2, ("mN m s", "N m s"): 1e-3,
 }  # fmt: skip
 
 
 def is_unit(text: str) -> bool:
     """Whether ``text`` names a unit."""
+    if any(text in pair for pair in _COMMON):
+        return True
     try:
         parse_unit(text)
     except BadInput:

@@ -22,6 +22,7 @@ from .errors import BadInput
 from .scatter import robust_sigma
 
 _MOST_PHASES = 64  # distinct offsets of the wanted instants within one sample step
+_FEW = 20_000  # weights up to which no compiled kernel is loaded: that takes as long as some million of them
 
 
 @dataclass(frozen=True)
@@ -171,13 +172,10 @@ def _lattice_step(t: np.ndarray) -> float | None:
     return step if _on_lattice(t, step) else None
 
 
-@jit
-def _on_lattice(t, step):
-    worst = 0.0
-    for i in range(len(t)):
-        place = (t[i] - t[0]) / step
-        worst = max(worst, abs(place - np.floor(place + 0.5)))
-    return worst < 1e-6
+def _on_lattice(t, step) -> bool:
+    off = (t - t[0]) / step
+    off -= np.rint(off)
+    return -1e-6 < off.min() and off.max() < 1e-6
 
 
 def _tricube(u: np.ndarray) -> np.ndarray:
@@ -227,82 +225,49 @@ def _complete_windows(t, y, at, step, reach, degree, order, fit) -> None:
         fit.add(here, (rows @ rows.T)[None], np.array([reach]), np.array([rows[0] @ (offset == 0)]))
 
 
-@jit
 def _lay(t, y, step):
     """Samples on their lattice, zero where one is missing, and how many are missing before each place."""
     count = int((t[-1] - t[0]) / step + 0.5) + 1
     if count == len(t):
         return y, np.zeros(count + 1, np.int32)
+    place = ((t - t[0]) / step + 0.5).astype(np.intp)
     lattice, missing = np.zeros(count), np.ones(count + 1, np.int32)
-    missing[0] = 0
-    for i in range(len(t)):
-        place = int((t[i] - t[0]) / step + 0.5)
-        lattice[place] = y[i]
-        missing[place + 1] = 0
-    for place in range(count):
-        missing[place + 1] += missing[place]
-    return lattice, missing
+    lattice[place] = y
+    missing[0] = missing[place + 1] = 0
+    return lattice, np.cumsum(missing, dtype=np.int32)
 
 
-@jit
 def _places(at, first, last, step, reach):
     """The sample at or before each instant; the number of its phase, how far on it is in steps; and the phases.
 
-    Number -1 where a window reaches past an end.  Gives up after one phase too many."""
-    base, which = np.empty(len(at), np.int32), np.full(len(at), -1, np.int8)
-    phases, count, number = np.empty(_MOST_PHASES + 1), 0, 0
-    for i in range(len(at)):
-        place = (at[i] - first) / step
-        base[i] = int(np.floor(place + 1e-7))  # small integers: at this speed memory is most of the time
-        if not first + reach <= at[i] <= last - reach:
-            continue
-        phase = np.floor(min(max(place - base[i], 0.0), 1.0) * 1e6 + 0.5) / 1e6
-        if count == 0 or phases[number] != phase:
-            number = 0
-            while number < count and phases[number] != phase:
-                number += 1
-            if number == count:
-                phases[count] = phase
-                count += 1
-                if count > _MOST_PHASES:
-                    break
-        which[i] = number
-    return base, which, phases[:count]
+    Number -1 where a window reaches past an end."""
+    place = (at - first) / step
+    base = np.floor(place + 1e-7)
+    phase = np.rint(np.clip(place - base, 0.0, 1.0) * 1e6)
+    inside = (at >= first + reach) & (at <= last - reach)
+    if (phase == phase[:1]).all():  # most records: nothing to sort
+        phases, which = phase[:1], np.zeros(len(at), np.intp)
+    else:
+        phases, which = np.unique(phase, return_inverse=True)
+    which[~inside] = -1
+    return base.astype(np.intp), which, phases / 1e6
 
 
-@jit
 def _complete(base, which, number, before, after, missing):
     """The instants of one phase whose window misses nothing, and whether they follow one another sample by sample."""
-    here, count, even = np.empty(len(base), np.int32), 0, True
-    for i in range(len(base)):
-        if which[i] == number:
-            low, high = base[i] + before, base[i] + after + 1
-            if low >= 0 and high < len(missing) and missing[high] == missing[low]:
-                even &= count == 0 or (here[count - 1] == i - 1 and base[i] == base[i - 1] + 1)
-                here[count] = i
-                count += 1
-    return here[:count], even
+    here = np.flatnonzero(which == number)
+    low, high = base[here] + before, base[here] + after + 1
+    here = here[(low >= 0) & (high < len(missing))]
+    if missing[-1]:
+        here = here[missing[base[here] + after + 1] == missing[base[here] + before]]
+    steps = np.diff(base[here])
+    return here, len(here) > 0 and here[-1] - here[0] == len(here) - 1 and bool((steps == 1).all())
 
 
-@jit
 def _correlate(y, rows, out):
-    """Correlations of y with every row into ``out`` (rows, :), in blocks that stay in the nearest cache."""
-    taps, count = rows.shape[1], out.shape[1]
-    whole = np.empty(512)
-    for begin in range(0, count, len(whole)):
-        block = whole[: min(len(whole), count - begin)]
-        for o in range(len(rows)):
-            block[:] = 0.0
-            for s in range(0, taps - 3, 4):
-                a, b, c, d = rows[o, s], rows[o, s + 1], rows[o, s + 2], rows[o, s + 3]
-                y0, y1, y2, y3 = y[begin + s :], y[begin + s + 1 :], y[begin + s + 2 :], y[begin + s + 3 :]
-                for i in range(len(block)):
-                    block[i] += a * y0[i] + b * y1[i] + c * y2[i] + d * y3[i]
-            for s in range(taps - taps % 4, taps):
-                a, y0 = rows[o, s], y[begin + s :]
-                for i in range(len(block)):
-                    block[i] += a * y0[i]
-            out[o, begin : begin + len(block)] = block
+    """Correlations of y with every row into ``out`` (rows, :)."""
+    for o in range(len(rows)):
+        out[o] = np.correlate(y[: out.shape[1] + rows.shape[1] - 1], rows[o], "valid")
 
 
 def _direct(t, y, at, which, degree, order, neighbors, half_width, fit) -> None:
@@ -320,8 +285,21 @@ def _direct(t, y, at, which, degree, order, neighbors, half_width, fit) -> None:
         low, high = best, best + neighbors
     positive = (high - low) - (a - t[low] >= bandwidth) - (t[high - 1] - a >= bandwidth)
     bandwidth = np.where(positive < degree + 1, bandwidth * 1.5, bandwidth)  # too few that weigh: widen those
-    fit.derivatives[:, which], gains, owns = _evaluate(t, y, a, low, high, bandwidth, degree, order)
+    evaluate = _evaluate if len(a) * neighbors > _FEW else _evaluate_few
+    fit.derivatives[:, which], gains, owns = evaluate(t, y, a, low, high, bandwidth, degree, order)
     fit.add(which, gains, bandwidth, owns)
+
+
+def _evaluate_few(t, y, at, low, high, bandwidth, degree, order):
+    """As ``_evaluate``, without a kernel to load: windows side by side, the shorter ones filled up with samples that weigh nothing."""
+    each = np.arange(np.max(high - low))
+    inside = each < (high - low)[:, None]
+    sample = np.where(inside, low[:, None] + each, low[:, None])
+    offset = t[sample] - at[:, None]
+    rows = np.zeros((len(at), 3, len(each)))
+    rows[:, :order] = _rows(np.where(inside, offset, bandwidth[:, None]), bandwidth, degree, order)
+    own = np.sum(rows[:, 0] * (inside & (offset == 0)), axis=1)
+    return np.einsum("mok,mk->om", rows, y[sample]), rows @ np.swapaxes(rows, 1, 2), own
 
 
 @jit

@@ -7,23 +7,23 @@ numbers are the same as those of the passive inertial-to-body form.  The algebra
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 
-def rotation(q_NB) -> Rotation:
+def rotation(q_NB) -> scipy.spatial.transform.Rotation:
     """SciPy's rotation for scalar-first quaternions, shape (4,) or (N, 4)."""
-    return Rotation.from_quat(np.asarray(q_NB, float), scalar_first=True)
+    return scipy.spatial.transform.Rotation.from_quat(np.asarray(q_NB, float), scalar_first=True)
 
 
-def quaternion(r: Rotation) -> np.ndarray:
+def quaternion(r: scipy.spatial.transform.Rotation) -> np.ndarray:
     return r.as_quat(scalar_first=True)
 
 
-def euler(order: str, angles_rad) -> Rotation:
+def euler(order: str, angles_rad) -> scipy.spatial.transform.Rotation:
     """Three rotations (N, 3) [rad] in SciPy's order: 'ZYX' about the axes as turned before, 'zyx' about fixed ones.
 
     'ZYX' with yaw, pitch and roll takes body vectors to those of the frame."""
-    return Rotation.from_euler(order, np.asarray(angles_rad, float))
+    return scipy.spatial.transform.Rotation.from_euler(order, np.asarray(angles_rad, float))
 
 
 def attitude_error(q_commanded, q_estimated) -> np.ndarray:
@@ -44,21 +44,21 @@ def rates_between(time_s, q_NB) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(time_s[:-1]) + dt / 2, step / dt[:, None]
 
 
-def turned_by(time_s, omega_B) -> Rotation:
+def turned_by(time_s, omega_B) -> scipy.spatial.transform.Rotation:
     """Attitudes (N) from body rates (N, 3) alone, body to the axes it had at the first instant: rates linear between samples.
 
     Products of neighbours, then of neighbours' products: each attitude is the product of all steps before it."""
     w, dt = np.asarray(omega_B, float), np.diff(time_s)
     steps = 0.5 * (w[1:] + w[:-1]) * dt[:, None]
-    r = Rotation.from_rotvec(np.vstack([np.zeros(3), steps]))
+    r = scipy.spatial.transform.Rotation.from_rotvec(np.vstack([np.zeros(3), steps]))
     reach = 1
     while reach < len(w):
-        r = Rotation.concatenate([r[:reach], r[:-reach] * r[reach:]])
+        r = scipy.spatial.transform.Rotation.concatenate([r[:reach], r[:-reach] * r[reach:]])
         reach *= 2
     return r
 
 
-def lvlh_to_inertial(position_N, velocity_N) -> Rotation:
+def lvlh_to_inertial(position_N, velocity_N) -> scipy.spatial.transform.Rotation:
     """LVLH axes (z to the planet, y against the orbit normal, x along the velocity) to inertial.
 
     position, velocity: (N, 3), any consistent unit."""
@@ -66,7 +66,7 @@ def lvlh_to_inertial(position_N, velocity_N) -> Rotation:
     z = -r / np.linalg.norm(r, axis=1, keepdims=True)
     y = -np.cross(r, v)
     y /= np.linalg.norm(y, axis=1, keepdims=True)
-    return Rotation.from_matrix(np.stack([np.cross(y, z), y, z], axis=2))
+    return scipy.spatial.transform.Rotation.from_matrix(np.stack([np.cross(y, z), y, z], axis=2))
 
 
 def angle_between(a, b) -> np.ndarray:
@@ -78,7 +78,7 @@ def angle_between(a, b) -> np.ndarray:
 _SPANS = 0.02
 
 
-def best_rotation(a, b) -> tuple[Rotation, bool]:
+def best_rotation(a, b) -> tuple[scipy.spatial.transform.Rotation, bool]:
     """The rotation that turns vectors b nearest to a, (N, 3) each, by least squares, and whether they tell it.
 
     Wahba's problem by singular values (Markley 1988).  Vectors of one direction leave the turn about it open: the smallest is given."""
@@ -90,12 +90,12 @@ def best_rotation(a, b) -> tuple[Rotation, bool]:
         axis = np.cross(y, x)
         if np.linalg.norm(axis) < 1e-9:  # alike, or opposite: about any axis across
             axis = np.cross(y, np.eye(3)[np.argmin(np.abs(y))])
-        return Rotation.from_rotvec(angle_between(y, x) * axis / np.linalg.norm(axis)), False
+        return scipy.spatial.transform.Rotation.from_rotvec(angle_between(y, x) * axis / np.linalg.norm(axis)), False
     flip = np.diag([1.0, 1.0, np.linalg.det(u) * np.linalg.det(v)])
-    return Rotation.from_matrix(u @ flip @ v), True
+    return scipy.spatial.transform.Rotation.from_matrix(u @ flip @ v), True
 
 
-def words_of(turn: Rotation) -> str:
+def words_of(turn: scipy.spatial.transform.Rotation) -> str:
     """A rotation in words: '90 deg about +z, (x, y, z) -> (-y, x, z)'."""
     v = turn.as_rotvec()
     angle = float(np.linalg.norm(v))

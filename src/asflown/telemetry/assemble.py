@@ -104,7 +104,7 @@ def channel_from(table: Table, use: Use, tai_ns: np.ndarray, findings: list[Find
         if use.fills:
             fill = np.isin(values, use.fills)
             declared, rows, values = np.union1d(declared, rows[fill]), rows[~fill], values[~fill]
-        if len(values) and np.max(np.abs(values)) > _LARGEST:
+        if len(values) and max(float(np.max(values)), -float(np.min(values))) > _LARGEST:
             row = int(rows[np.argmax(np.abs(values))])
             raise BadInput(
                 "the value is too large for a measurement",
@@ -128,9 +128,8 @@ def channel_from(table: Table, use: Use, tai_ns: np.ndarray, findings: list[Find
             )  # fmt: skip
     if len(rows) == 0:
         raise BadInput("the column has no values", channel=use.name, remedy="Remove the column, or add its data.")
-    return Channel(
-        use.name, tai_ns[rows], values, np.ones(len(rows), bool), use.unit, use.count_size, modulus=use.modulus
-    )
+    at = tai_ns if len(rows) == len(tai_ns) else tai_ns[rows]
+    return Channel(use.name, at, values, np.ones(len(rows), bool), use.unit, use.count_size, modulus=use.modulus)
 
 
 def time_scale(table: Table | TextFile) -> Scale:

@@ -145,9 +145,13 @@ def _without_second_copies(channels: dict[str, Channel]) -> tuple[dict[str, Chan
 
     They are told by their values: alike within a tenth of the noise, in most samples of the channel."""
     channels, found = dict(channels), []
+    even: dict[int, bool] = {}  # by the id of an axis of times
     for name, c in channels.items():
+        if c.kind.behaves != "sensor" or len(c.tai_ns) <= 30 or even.get(id(c.tai_ns)):
+            continue
         steps = np.diff(c.tai_ns)
-        if c.kind.behaves != "sensor" or len(steps) < 30 or (steps == steps[0]).all():
+        even[id(c.tai_ns)] = bool((steps == steps[0]).all())
+        if even[id(c.tai_ns)]:
             continue
         beside = np.maximum(np.concatenate((steps[1:], [0])), np.concatenate(([0], steps[:-1])))
         close = steps < _AT_ONCE * beside

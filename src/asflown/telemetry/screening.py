@@ -7,14 +7,12 @@ quantisation would produce, and reports only what they do not explain.
 from __future__ import annotations
 
 import os
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import pdtrc
+import scipy
 
 from ..kit.scatter import MEDIAN_SIZE, difference_sigma
 from ..kit.timeline import NS, segments
@@ -71,10 +69,8 @@ def screen(telemetry: Telemetry, craft=None) -> Telemetry:
     for look in (_of_one_sign, _without_unfilled):
         channels, found = look(channels)
         findings += found
-    with ThreadPoolExecutor(
-        min(len(channels), os.cpu_count() or 1) or 1
-    ) as pool:  # sorting and differencing run beside each other
-        screened = list(pool.map(partial(_screened, craft=craft), channels.values()))
+    pauses = {id(c.tai_ns): _Pauses.of(c.tai_ns) for c in {id(c.tai_ns): c for c in channels.values()}.values()}
+    screened = _each(partial(_screened, craft=craft, pauses=pauses), list(channels.values()))
     steps = {c.name: step for c, step, _ in screened if c.kind.behaves != "state"}
     channels = {c.name: c for c, _, _ in screened}
     findings += [f for _, _, found in screened for f in found]
@@ -93,10 +89,23 @@ def screen(telemetry: Telemetry, craft=None) -> Telemetry:
     )
 
 
-def _screened(c: Channel, craft) -> tuple[Channel, float, list[Finding]]:
-    """One channel with unusable samples marked, its quantisation step, and what was found."""
+def _each(look, channels: list[Channel]) -> list[tuple[Channel, float, list[Finding]]]:
+    """What ``look`` makes of each channel; of long ones beside each other, as sorting and differencing run in threads."""
+    if sum(len(c.values) for c in channels) < _LEVELS_FROM:
+        return [look(c) for c in channels]
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(min(len(channels), os.cpu_count() or 1)) as pool:
+        return list(pool.map(look, channels))
+
+
+def _screened(c: Channel, craft, pauses: dict[int, _Pauses]) -> tuple[Channel, float, list[Finding]]:
+    """One channel with unusable samples marked, its quantisation step, and what was found.
+
+    ``pauses``: of every axis of times, by its id."""
+    paused = pauses[id(c.tai_ns)].findings(c.name)
     if c.kind.behaves == "state":
-        return c, 0.0, _pauses(c)
+        return c, 0.0, paused
     step = max(c.count_size, quantisation_step(c.values))
     findings: list[Finding] = []
     c, found = _within_limits(_unwrapped(c, findings), craft)
@@ -104,47 +113,55 @@ def _screened(c: Channel, craft) -> tuple[Channel, float, list[Finding]]:
     for test in (_without_fills, _without_plateaus, _without_spikes, _without_stuck, _without_repeats):
         c, found = test(c, step)
         findings += found
-    return c, step, [*findings, *_falls(c), *_pauses(c)]
+    return c, step, [*findings, *_falls(c), *paused]
 
 
 # ---- pauses -----------------------------------------------------------------------------------------
 
 
-def _pauses(c: Channel) -> list[Finding]:
-    """Dropouts (at most BRIDGED samples missing) and gaps, by the channel's own cadence."""
-    found, cadence = [], c.cadence_ns
-    for what, spans in (("dropout", dropouts(c)), ("gap", gaps(c))):
-        if spans:
-            longest = max(b - a for a, b in spans) / NS
-            missing = sum(round((b - a) / cadence) - 1 for a, b in spans)
-            word = "longest" if len(spans) > 1 else "of"
-            found.append(
-                Finding(c.name, what, len(spans), spans[0][0], f"{missing} samples missing, {word} {longest:g} s")
-            )
-    return found
+@dataclass(frozen=True)
+class _Pauses:
+    """Dropouts (at most BRIDGED samples missing) and gaps of one axis of times: (last sample before, first after). [ns TAI]"""
+
+    cadence_ns: int
+    dropouts: list[tuple[int, int]]
+    gaps: list[tuple[int, int]]
+
+    @classmethod
+    def of(cls, tai_ns: np.ndarray) -> _Pauses:
+        """By the axis' own cadence; one sampled on events has none, so no gaps."""
+        steps = np.diff(tai_ns)
+        if len(steps) == 0 or (steps == steps[0]).all():
+            return cls(int(steps[0]) if len(steps) else 0, [], [])
+        cadence = int(np.median(steps))
+        if len(steps) < 2 or not np.mean(np.abs(steps - cadence) < 0.3 * cadence) > 0.5:
+            return cls(cadence, [], [])
+        missed = np.flatnonzero(steps > 1.5 * cadence)
+        spans = [(int(tai_ns[i]), int(tai_ns[i + 1])) for i in missed]
+        longest = (BRIDGED + 1.5) * max(cadence, 1)
+        return cls(cadence, [s for s in spans if s[1] - s[0] <= longest], [s for s in spans if s[1] - s[0] > longest])
+
+    def findings(self, channel: str) -> list[Finding]:
+        found = []
+        for what, spans in (("dropout", self.dropouts), ("gap", self.gaps)):
+            if spans:
+                longest = max(b - a for a, b in spans) / NS
+                missing = sum(round((b - a) / self.cadence_ns) - 1 for a, b in spans)
+                word = "longest" if len(spans) > 1 else "of"
+                found.append(
+                    Finding(channel, what, len(spans), spans[0][0], f"{missing} samples missing, {word} {longest:g} s")
+                )
+        return found
 
 
 def gaps(c: Channel) -> list[tuple[int, int]]:
     """(last sample before, first after) of every gap: more than BRIDGED samples missing. [ns TAI]"""
-    if not _is_regular(c):
-        return []
-    cuts = segments(c.tai_ns, BRIDGED, c.cadence_ns)
-    return [(int(c.tai_ns[a.stop - 1]), int(c.tai_ns[b.start])) for a, b in pairwise(cuts)]
+    return _Pauses.of(c.tai_ns).gaps
 
 
 def dropouts(c: Channel) -> list[tuple[int, int]]:
     """(last sample before, first after) of every run of 1 to BRIDGED missing samples. [ns TAI]"""
-    if not _is_regular(c):
-        return []
-    steps, cadence = np.diff(c.tai_ns), c.cadence_ns
-    missed = (steps > 1.5 * cadence) & (steps <= (BRIDGED + 1.5) * cadence)
-    return [(int(c.tai_ns[i]), int(c.tai_ns[i + 1])) for i in np.flatnonzero(missed)]
-
-
-def _is_regular(c: Channel) -> bool:
-    """A channel sampled on events has no cadence, so no gaps."""
-    steps, cadence = np.diff(c.tai_ns), c.cadence_ns
-    return len(steps) >= 2 and bool(np.mean(np.abs(steps - cadence) < 0.3 * cadence) > 0.5)
+    return _Pauses.of(c.tai_ns).dropouts
 
 
 # ---- noise and quantisation -------------------------------------------------------------------------
@@ -164,8 +181,13 @@ def sample_noise(c: Channel) -> float:
     return sigma if np.isfinite(sigma) else 0.0
 
 
-#: A longer record's quantisation step is inferred from blocks of its samples.
+#: A longer record's quantisation step is inferred from blocks of its samples, and its medians from evenly chosen ones.
 _LEVELS_FROM, _BLOCK = 1 << 17, 1 << 14
+
+
+def _few(x: np.ndarray) -> np.ndarray:
+    """Samples that stand for all of them where a median or a quantile is wanted: 100,000 tell it to half a percent."""
+    return x[:: len(x) // _LEVELS_FROM + 1]
 
 
 def quantisation_step(values: np.ndarray) -> float:
@@ -232,15 +254,16 @@ def _without_fills(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     values = c.values
     if c.kind.behaves == "cumulative" or len(values) < _FEWEST:
         return c, []
-    fill = np.zeros(len(values), bool)
+    fill, rest = np.zeros(len(values), bool), values
     for _ in range(3):  # more than one fill value may occur, the farthest first
-        rest = values[~fill] if fill.any() else values
-        centre = float(np.median(rest))
-        low, high = float(np.min(rest)), float(np.max(rest))
+        centre = float(np.median(_few(rest)))
+        low, high = c.extremes if rest is values else (float(np.min(rest)), float(np.max(rest)))
         far = high if high - centre > centre - low else low
+        if far == 0 or np.count_nonzero(rest == far) < 2:
+            break
         here = (values == far) & ~fill
         others = values[~fill & ~here]
-        if here.sum() < 2 or len(others) < _FEWEST or far == 0:
+        if len(others) < _FEWEST:
             break
         spread = float(np.ptp(others)) + 10 * step
         known = np.float32(abs(far)) in _FILL_VALUES
@@ -248,8 +271,8 @@ def _without_fills(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
             break
         if not known and not _comes_back(values, here, fill, 0.2 * abs(far - centre)):
             break
-        fill |= here
-    if not fill.any():
+        fill, rest = fill | here, others
+    if rest is values:
         return c, []
     said = ", ".join(f"{v:.6g}" for v in np.unique(values[fill]))
     return _marked(
@@ -274,8 +297,11 @@ def _without_plateaus(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     if c.kind.stem not in _MEASURED or len(c.values) < _FEWEST:
         return c, []
     flat = np.zeros(len(c.values), bool)
-    for extreme in (np.max(c.values), np.min(c.values)):
-        starts, stops = _runs_of(c.values == extreme)
+    for extreme in c.extremes[::-1]:
+        at_end = c.values == extreme
+        if np.count_nonzero(at_end) < _PLATEAU:
+            continue
+        starts, stops = _runs_of(at_end)
         inside = (starts > 0) & (stops < len(c.values)) & (stops - starts >= _PLATEAU)
         if not inside.any():
             continue
@@ -299,25 +325,26 @@ def _without_spikes(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     n = len(c.values)
     if c.kind.behaves == "steps" or n < _FEWEST:
         return c, []
-    x = np.pad(c.values, 2, mode="edge")
-    before2, before, here, after, after2 = x[:-4], x[1:-3], c.values, x[3:-1], x[4:]
-    height = np.abs(here - (before + after) / 2)
-    bend = np.abs(before - 2 * here + after)
-    sigma = max(float(np.median(bend)), 1e-12 * float(np.max(np.abs(here)))) / _MEDIAN_OF_SECOND
-    spike = height > SPIKE_SIGMAS * max(sigma, step / 2)
-    for a, b in ((before, after), (before2, before), (after, after2)):
-        spike &= np.abs(a - b) < AGREE * height
-    at = np.flatnonzero(spike & c.valid)
+    x = c.values
+    bend = np.diff(x, 2)
+    np.abs(bend, out=bend)  # of samples 1 to n - 2: twice the height over both neighbours
+    sigma = max(float(np.median(_few(bend))), 1e-12 * max(abs(e) for e in c.extremes)) / _MEDIAN_OF_SECOND
+    at = np.flatnonzero(bend > 2 * SPIKE_SIGMAS * max(sigma, step / 2)) + 1
+    around = [x[np.clip(at + k, 0, n - 1)] for k in (-2, -1, 1, 2)]
+    alike = c.valid[at]
+    for a, b in ((1, 2), (0, 1), (2, 3)):
+        alike &= np.abs(around[a] - around[b]) < AGREE * bend[at - 1] / 2
+    at = at[alike]
     if len(at) == 0:
         return c, []
     # noise may change with time: that of about 30 samples must be exceeded too
-    width = min(31, n)
-    around = np.clip(at[:, None] + np.arange(-(width // 2), width - width // 2), 0, n - 1)
-    local = np.median(bend[around], axis=1) / _MEDIAN_OF_SECOND
+    width = min(31, n - 2)
+    near = np.clip(at - 1 - width // 2, 0, n - 2 - width)[:, None] + np.arange(width)
+    local = np.median(bend[near], axis=1) / _MEDIAN_OF_SECOND
     steps = np.diff(c.tai_ns)
-    beside = np.maximum(steps[np.maximum(at - 1, 0)], steps[np.minimum(at, n - 2)]) <= 3.5 * c.cadence_ns
-    spike[:] = False
-    spike[at] = beside & (at > 0) & (at < n - 1) & (height[at] > SPIKE_SIGMAS * local)
+    beside = np.maximum(steps[at - 1], steps[at]) <= 3.5 * c.cadence_ns
+    spike = np.zeros(n, bool)
+    spike[at] = beside & (bend[at - 1] / 2 > SPIKE_SIGMAS * local)
     return _marked(c, spike, "spike", "single samples far off both neighbours, not used")
 
 
@@ -325,11 +352,12 @@ def _without_stuck(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     """A noisy sensor that repeats one value for a long run."""
     if c.kind.stem not in _MEASURED or len(c.values) < 3 * STUCK_RUN:
         return c, []
-    if (c.values == c.values[0]).all():
+    same = c.values[1:] == c.values[:-1]
+    if same.all():
         detail = f"the same value throughout, {c.values[0]:g}: a stuck sensor, or motion below one count? Used"
         return c, [Finding(c.name, "still", len(c.values), int(c.tai_ns[0]), detail)]
     stuck, still = np.zeros(len(c.values), bool), np.zeros(len(c.values), bool)
-    starts, stops = _runs_of(np.diff(c.values) == 0)
+    starts, stops = _runs_of(same)
     long = stops - starts + 1 >= STUCK_RUN
     for start, stop in zip(starts[long].tolist(), stops[long].tolist(), strict=True):
         change = np.diff(c.values[max(0, start - 60) : start + 1])
@@ -356,21 +384,28 @@ def _without_stuck(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
 
 def _without_repeats(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     """Short runs of one value in a noisy channel, more frequent than quantisation produces."""
-    change = np.diff(c.values)
-    if c.kind.stem not in _MEASURED | {"control_torque"} or len(change) < 20 or change.all() or not change.any():
+    if c.kind.stem not in _MEASURED | {"control_torque"} or len(c.values) <= 20:
         return c, []
-    step = max(step, 1e-15 * float(np.max(np.abs(c.values))))
-    moves = np.abs(change[change != 0])
+    v = c.values
+    same = v[1:] == v[:-1]
+    count = np.count_nonzero(same)
+    if count in (0, len(same)):
+        return c, []
+    step = max(step, 1e-15 * max(abs(e) for e in c.extremes))
+    moves = _few_moves(v)
     if float(np.median(moves)) < _FINE * step:
         return c, []
-    starts, stops = _runs_of(change == 0)
-    inside = (starts > 0) & (stops < len(change)) & (stops - starts < STUCK_RUN - 1)
+    starts, stops = _runs_of(same)
+    inside = (starts > 0) & (stops < len(same)) & (stops - starts < STUCK_RUN - 1)
     starts, stops = starts[inside], stops[inside]
-    alone = np.minimum(np.abs(change[starts - 1]), np.abs(change[stops])) > 3 * step
+    alone = np.minimum(np.abs(v[starts] - v[starts - 1]), np.abs(v[stops + 1] - v[stops])) > 3 * step
     starts, stops = starts[alone], stops[alone]
-    if len(starts) == 0 or pdtrc(len(starts) - 1, _zeros_by_chance(moves, step)) > CHANCE:
+    if len(starts) == 0:
         return c, []
-    edges = np.zeros(len(c.values) + 1, np.int64)
+    by_chance = (len(same) - count) * _repeats_per_move(moves, step)
+    if scipy.special.pdtrc(len(starts) - 1, by_chance) > CHANCE:
+        return c, []
+    edges = np.zeros(len(v) + 1, np.int64)
     edges[starts + 1] += 1
     edges[stops + 1] -= 1
     repeated = np.cumsum(edges[:-1]) > 0
@@ -382,35 +417,46 @@ def _without_repeats(c: Channel, step: float) -> tuple[Channel, list[Finding]]:
     return _marked(c, repeated, "repeat", "samples repeat the previous value bit for bit: stale, not used")
 
 
-def _zeros_by_chance(moves: np.ndarray, step: float) -> float:
-    """Samples that repeat from quantisation alone: no change is about as frequent as any other small change of one step."""
+def _few_moves(values: np.ndarray) -> np.ndarray:
+    """Sizes of the changes from one sample to the next, of those that change; of a long record evenly chosen ones."""
+    each = len(values) // _LEVELS_FROM + 1
+    change = np.abs(values[1::each] - values[:-1:each])
+    return change[change > 0]
+
+
+def _repeats_per_move(moves: np.ndarray, step: float) -> float:
+    """Samples that repeat from quantisation alone, for each that moves: no change is about as frequent as any other small change of
+    one step."""
     width = max(5 * step, float(np.quantile(moves, 0.1)))
-    return float(1.5 * np.sum(moves <= width) * step / (2 * width))
+    return float(1.5 * np.mean(moves <= width) * step / (2 * width))
 
 
 def _falls(c: Channel) -> list[Finding]:
     """Cumulative counts that decrease, and sawteeth: undeclared wraps or resets."""
-    x, t = c.usable.values, c.usable.tai_ns
+    c = c.usable
+    x, t = c.values, c.tai_ns
     if len(x) < 6:
         return []
+    swung, most = c.kind.stem in ("wheel_rate", "attitude_error"), 0.75 * (c.extremes[1] - c.extremes[0])
+    if not (swung or c.kind.stem == "accelerometer_count" or c.kind.behaves == "cumulative"):
+        return []
     jump = np.diff(x)
+    if swung and -most <= jump.min() and jump.max() <= most:
+        return []
     if c.kind.stem == "accelerometer_count":  # counts down as well as up, by thrust and by its own bias
         hit = np.abs(jump) > max(0.5 * float(np.ptp(x)), 50 * float(np.median(np.abs(jump))) + 1)
         detail = "jumps over much of its range: a wrap (declare it in a channel dictionary) or a reset"
     elif c.kind.behaves == "cumulative":
         hit = jump < 0
         detail = "decreases although it is cumulative: a wrap (declare it in a channel dictionary) or a reset"
-    elif c.kind.stem in ("wheel_rate", "attitude_error"):
-        hit = np.abs(jump) > max(0.75 * np.ptp(x), 50 * sample_noise(c))
+    else:
+        noise = sample_noise(c)
+        hit = np.abs(jump) > max(most, 50 * noise)
         for i in np.flatnonzero(hit):
             before, after = jump[max(0, i - 5) : i], jump[i + 1 : i + 6]
-            drift = [
-                np.sign(d.mean()) if len(d) and np.abs(d.sum()) > 3 * sample_noise(c) else 0 for d in (before, after)
-            ]
+            drift = [np.sign(d.mean()) if len(d) and np.abs(d.sum()) > 3 * noise else 0 for d in (before, after)]
             hit[i] = drift[0] == drift[1] == -np.sign(jump[i])
         detail = "jumps over its whole range against its own drift: an undeclared wrap?"
-    else:
-        return []
     if not hit.any():
         return []
     first = int(np.flatnonzero(hit)[0])
@@ -458,10 +504,12 @@ def _frames(channels: dict[str, Channel], stems: frozenset[str]) -> list[list[st
 def _without_repeated_frames(channels: dict[str, Channel], steps: dict[str, float]):
     """Instants at which all noisy channels sampled together repeat their previous values."""
     channels, findings = dict(channels), []
-    moving = {n: c for n, c in channels.items() if n in steps and np.any(c.values[1:] != c.values[:-1])}
+    moving = {n: c for n, c in channels.items() if n in steps and c.extremes[0] < c.extremes[1]}
     for names in _frames(moving, _MEASURED):
         values = [channels[n].values for n in names]
-        whole = np.logical_and.reduce([v[1:] == v[:-1] for v in values])
+        whole = values[0][1:] == values[0][:-1]
+        for v in values[1:]:
+            whole &= v[1:] == v[:-1]
         if not whole.any():
             continue
         by_chance = whole.size * float(
@@ -471,7 +519,7 @@ def _without_repeated_frames(channels: dict[str, Channel], steps: dict[str, floa
         starts, stops = _runs_of(whole)
         for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
             whole[start:stop] = start > 0 and stop < whole.size and stop - start < STUCK_RUN - 1
-        if not whole.any() or pdtrc(whole.sum() - 1, by_chance) > CHANCE:
+        if not whole.any() or scipy.special.pdtrc(whole.sum() - 1, by_chance) > CHANCE:
             continue
         hit = np.concatenate(([False], whole))
         for n in names:
@@ -485,11 +533,10 @@ def _without_repeated_frames(channels: dict[str, Channel], steps: dict[str, floa
 
 def _repeats_by_chance(values: np.ndarray, step: float) -> float:
     """Share of the samples that repeat the last one by chance; a fine channel does so seldom."""
-    change = np.diff(values)
-    share, moves = float(np.mean(change == 0)), np.abs(change[change != 0])
+    share, moves = float(np.mean(values[1:] == values[:-1])), _few_moves(values)
     if float(np.median(moves)) < _FINE * step:
         return share
-    return min(share, _zeros_by_chance(moves, max(step, 1e-15)) / change.size)
+    return min(share, (1 - share) * _repeats_per_move(moves, max(step, 1e-15)))
 
 
 def _without_unfilled(channels: dict[str, Channel]) -> tuple[dict[str, Channel], list[Finding]]:
@@ -573,6 +620,8 @@ def _implausible(channels: dict[str, Channel], craft) -> list[Doubt]:
         if kind.stem == "wheel_rate" and c.member in limits:
             limit, whose = _OVER_LIMIT * limits[c.member], f"{craft.name}'s wheel rate limit"
         if limit is None or not c.valid.any():
+            continue
+        if -limit <= c.extremes[0] and c.extremes[1] <= limit:
             continue
         size = np.abs(c.usable.values)
         if np.mean(size > limit) > _FEW:  # a short outlier is not a wrong unit

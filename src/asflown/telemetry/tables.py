@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,6 +39,11 @@ class Table:
 
     def __len__(self) -> int:
         return max((len(c) for c in (*self.columns, *self.instants.values())), default=0)
+
+    @cached_property
+    def every_row(self) -> np.ndarray:
+        """The numbers of all rows, one array for all columns."""
+        return np.arange(len(self))
 
     def line(self, row: int) -> int | None:
         return int(self.lines[row]) if len(self.lines) else None
@@ -70,11 +76,12 @@ def numbers_of(table: Table, column: int, channel: str) -> tuple[np.ndarray, np.
     cells = table.columns[column]
     if isinstance(cells, np.ndarray) and cells.dtype.kind in "fiub":
         masked = isinstance(cells, np.ma.MaskedArray)
-        rows = np.flatnonzero(~np.ma.getmaskarray(cells)) if masked else np.arange(len(cells))
+        rows = np.flatnonzero(~np.ma.getmaskarray(cells)) if masked else table.every_row
         values = np.asarray(cells.data[rows] if masked else cells, float)
-        nan = np.isnan(values)
-        said_nan = rows[nan] if masked else rows[:0]
-        if nan.any():
+        said_nan = rows[:0]
+        if len(values) and np.isnan(np.min(values)):
+            nan = np.isnan(values)
+            said_nan = rows[nan] if masked else rows[:0]
             rows, values = rows[~nan], values[~nan]
     else:
         rows, texts = _sampled(cells)
@@ -89,7 +96,7 @@ def numbers_of(table: Table, column: int, channel: str) -> tuple[np.ndarray, np.
                 remedy="Write a number, or leave the cell blank where the channel was not sampled.",
             )
         rows, values, said_nan = rows[~nan], values[~nan], rows[nan]
-    if not np.isfinite(values).all():
+    if len(values) and not (np.isfinite(np.min(values)) and np.isfinite(np.max(values))):
         bad = int(np.flatnonzero(~np.isfinite(values))[0])
         raise BadInput(
             f"{_shown(cells[rows[bad]])} is not finite",

@@ -7,6 +7,7 @@ whether it may be used; exclusions give the reason why not.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -75,6 +76,11 @@ class Channel:
     def cadence_ns(self) -> int:
         """Median step of its samples. [ns]"""
         return cadence_ns(self.tai_ns)
+
+    @cached_property
+    def extremes(self) -> tuple[float, float]:
+        """Smallest and largest value, of all samples."""
+        return float(np.min(self.values)), float(np.max(self.values))
 
     @property
     def usable(self) -> Channel:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import gzip
 import io
-import mmap
 import re
 import tempfile
 import zlib
@@ -26,7 +25,7 @@ from ..kit.quantities import is_unit
 from ..kit.timeline import posix_to_tai_ns
 from .channels import split_header
 from .tables import Table, check_headings, checked, quiet_database, quoted_pattern, typed
-from .times import DECIMALS, UNITS_NS
+from .times import DECIMALS, UNITS_NS, NotATime, exact_ns
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -351,53 +350,75 @@ class TextFile:
 _ISO = r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(\.\d{1,9})?(Z|\+00:00| UTC)?"
 
 
+#: A decimal of so many digits and its double are one to one.
+_ONE_TO_ONE = 15
+
+
 def _by_duckdb(
     file: TextFile, time: int, scale: Scale, numbers: tuple[int, ...], words: tuple[int, ...]
 ) -> Table | None:
     """The used columns by DuckDB; None where the text needs the csv module, or a cell is not what it should be."""
     import duckdb
 
-    if scale.kind == "pattern" or not _is_plain(file.path, file.form):
+    if scale.kind == "pattern" or (seen := _look(file)) is None:
         return None
-    cell = {j: f"c{j}" if file.form.decimal == "." else f"replace(c{j}, ',', '.')" for j in (time, *numbers)}
-    if scale.kind == "utc":
-        stamp = f"regexp_replace({cell[time]}, '(Z|\\+00:00| UTC)$', '')"
-        clock = f"CASE WHEN regexp_full_match({cell[time]}, '{_ISO}') THEN epoch_ns(CAST({stamp} AS TIMESTAMP_NS)) ELSE error('no') END"
-    else:
-        number = f"CAST({_strict(cell[time], time)} AS DECIMAL(28,{DECIMALS[scale.unit]}))"
-        clock = f"CAST(({number} - {scale.origin}) * {UNITS_NS[scale.unit]} AS BIGINT)"
-    chosen = [f"{clock} AS t"]
-    chosen += [f"CAST({_strict(cell[j], j)} AS DOUBLE) AS n{j}" for j in numbers]
+    direct = set() if seen.underscores else set(numbers) - {time, *words}
+    chosen = [f"{f'c{j}' if j in direct else _number(f'c{j}', file.form.decimal)} AS n{j}" for j in numbers]
     chosen += [f"c{j} AS w{j}" for j in words]
-    how = (
-        "auto_detect=false, header=false, strict_mode=true, null_padding=false, nullstr='', quote='', escape='', "
-        f"compression='none', skip={file.form.first_line - 1}, delim=$delimiter, columns=$columns"
-    )
+    types = dict.fromkeys(range(file.form.width), "VARCHAR") | dict.fromkeys(direct, "DOUBLE")
     try:
-        with quiet_database() as db:
-            found = db.execute(
-                f"SELECT {', '.join(chosen)} FROM read_csv($path, {how})",
-                {
-                    "path": quoted_pattern(file.path),
-                    "delimiter": file.form.delimiter,
-                    "columns": {f"c{j}": "VARCHAR" for j in range(file.form.width)},
-                },
-            ).fetchnumpy()
+        for clock in _clocks(file.form, time, scale, seen):
+            found = _selected(file, [*clock, *chosen], types)
+            if "long" not in found or not found.pop("long").any():
+                break
     except duckdb.Error:
         return None
-    return _table(file, found, time, scale, numbers, words)
+    return _table(file, found, time, scale, numbers, words) if len(found["t"]) == seen.rows else None
 
 
-def _strict(cell: str, column: int) -> str:
-    """DuckDB reads 1_000 as a number; telemetry is never written so."""
-    return f"CASE WHEN contains(c{column}, '_') THEN error('no') ELSE {cell} END"
+def _number(cell: str, decimal: str, kind: str = "DOUBLE") -> str:
+    """A cell of text as a number; DuckDB reads 1_000 as one, telemetry is never written so."""
+    plain = cell if decimal == "." else f"replace({cell}, ',', '.')"
+    return f"CAST(CASE WHEN contains({cell}, '_') THEN error('no') ELSE {plain} END AS {kind})"
+
+
+def _clocks(form: Form, time: int, scale: Scale, seen: _Seen) -> list[list[str]]:
+    """Ways to select the times: as doubles where their digits allow, of which ``long`` tells, else as decimals in ns."""
+    cell = f"c{time}"
+    if scale.kind == "utc":
+        stamp = f"regexp_replace({cell}, '(Z|\\+00:00| UTC)$', '')"
+        return [[f"CASE WHEN regexp_full_match({cell}, '{_ISO}') THEN epoch_ns(CAST({stamp} AS TIMESTAMP_NS)) ELSE error('no') END AS t"]]  # fmt: skip
+    exact = _number(cell, form.decimal, f"DECIMAL(28,{DECIMALS[scale.unit]})")
+    decimals = [f"CAST(({exact} - {scale.origin}) * {UNITS_NS[scale.unit]} AS BIGINT) AS t"]
+    doubles = [f"{_number(cell, form.decimal)} AS t", f"strlen({cell}) > {_ONE_TO_ONE} AS long"]
+    return [decimals] if len(seen.first.split(form.delimiter)[time]) > _ONE_TO_ONE else [doubles, decimals]
+
+
+def _selected(file: TextFile, chosen: list[str], types: dict[int, str]) -> dict[str, np.ndarray]:
+    how = (
+        "auto_detect=false, header=false, strict_mode=true, null_padding=false, nullstr='', quote='', escape='', "
+        f"compression='none', skip={file.form.first_line - 1}, delim=$delimiter, decimal_separator=$decimal, columns=$columns"
+    )
+    with quiet_database() as db:
+        return db.execute(
+            f"SELECT {', '.join(chosen)} FROM read_csv($path, {how})",
+            {
+                "path": quoted_pattern(file.path),
+                "delimiter": file.form.delimiter,
+                "decimal": file.form.decimal,
+                "columns": {f"c{j}": types[j] for j in range(file.form.width)},
+            },
+        ).fetchnumpy()
 
 
 def _table(file: TextFile, found, time: int, scale: Scale, numbers, words) -> Table | None:
     clock = found.pop("t")
     if np.ma.is_masked(clock) or len(clock) == 0:
         return None
-    ns = np.asarray(clock, np.int64)
+    try:
+        ns = exact_ns(clock, scale) if clock.dtype.kind == "f" else np.asarray(clock, np.int64)
+    except NotATime:
+        return None
     columns: list = [()] * len(file.headings)
     for j in numbers:
         columns[j] = found.pop(f"n{j}")
@@ -417,25 +438,43 @@ def _table(file: TextFile, found, time: int, scale: Scale, numbers, words) -> Ta
     )
 
 
-def _is_plain(path: Path, form: Form) -> bool:
-    """Whether no quotation mark, comment, blank line or odd line end stands among the rows."""
-    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
-        if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            return False
-        start = 0
-        for _ in range(form.first_line - 1):
-            start = text.find(b"\n", start) + 1
-            if start == 0:
-                return False
-        end = len(text)
-        while end > start and text[end - 1 : end] in (b"\n", b"\r", b" "):
-            end -= 1
-        odd = (b'"', b"\n#", b"\n\n", b"\n\r", b"\r\r", b"\0")
-        if any(text.find(mark, start, end) >= 0 for mark in odd) or text[start : start + 1] in (b"#", b"\n", b"\r"):
-            return False
-        first = text.find(b"\n", start)
-        ends = b"\r\n" if first > 0 and text[first - 1 : first] == b"\r" else b"\n"
-        return ends == b"\r\n" or text.find(b"\r", start, end) < 0
+@dataclass(frozen=True)
+class _Seen:
+    """What stands among the rows of a text: how many there are, the first of them, and whether an underscore is among them."""
+
+    rows: int
+    first: str
+    underscores: bool
+
+
+_BLOCK = 1 << 22
+
+
+def _look(file: TextFile) -> _Seen | None:
+    """One look at the bytes of the rows; None where a quotation mark, comment or odd line end stands among them.
+
+    Blank lines show as rows that are missing in the end."""
+    ends = returns = 0
+    underscores, last, first = False, b"\n", b""
+    with file.path.open("rb") as text:
+        if text.read(2) in (b"\xff\xfe", b"\xfe\xff"):
+            return None
+        text.seek(0)
+        for _ in range(file.form.first_line - 1):
+            text.readline()
+        while block := text.read(_BLOCK):
+            if b'"' in block or b"\0" in block or (b"#" in block and b"\n#" in last[-1:] + block):
+                return None
+            first = first or block[:10_000]
+            underscores |= b"_" in block
+            ends += block.count(b"\n")
+            returns += block.count(b"\r")
+            last = block if len(block) > 1000 else last + block
+    blank = last[len(last.rstrip(b"\n\r ")) :]
+    if returns not in (0, ends):
+        return None
+    line = first.partition(b"\n")[0].decode("utf-8", "replace")
+    return _Seen(ends - blank.count(b"\n") + 1, line, underscores)
 
 
 def _cell_by_cell(text: str, form: Form) -> Table:

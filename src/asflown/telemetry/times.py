@@ -89,7 +89,7 @@ def scale_called(text: str) -> Scale | None:
 def exact_ns(cells: Iterable | np.ndarray, scale: Scale) -> np.ndarray:
     """Numbers of a scale, less its origin, as ns.  Raises the index of the first cell that is not such a number."""
     if isinstance(cells, np.ndarray) and cells.dtype.kind in "iuf" and not np.ma.is_masked(cells):
-        fast = _exact_of_numbers(np.asarray(cells), scale)
+        fast = exact_of_numbers(np.asarray(cells), scale)
         if fast is not None:
             return fast
         cells = cells.tolist()
@@ -108,22 +108,29 @@ def exact_ns(cells: Iterable | np.ndarray, scale: Scale) -> np.ndarray:
     return np.array(ns, np.int64)
 
 
-def _exact_of_numbers(values: np.ndarray, scale: Scale) -> np.ndarray | None:
+def exact_of_numbers(values: np.ndarray, scale: Scale) -> np.ndarray | None:
     """Typed numbers as ns, by the decimals that they were written with; None where they need more care."""
     factor = UNITS_NS[scale.unit]
-    for decimals in (0, 3, 6, DECIMALS[scale.unit]):
+    for decimals in range(DECIMALS[scale.unit] + 1):
         power = 10**decimals
+        few = values[:1000].astype(float)
+        if not (np.rint(few * power) / power == few).all():
+            continue
         whole = np.rint(values.astype(float) * power)
         # a decimal of 15 digits and its double are one to one; integers beyond are left to the decimals
-        if power > factor * 100 or not (np.abs(whole) < 9e14).all() or not (whole / power == values).all():
+        largest = max(float(np.max(whole, initial=0)), -float(np.min(whole, initial=0)))
+        if power > factor * 100 or not largest < 9e14 or not (whole / power == values).all():
             continue
         origin = scale.origin * power
         if (
             origin == int(origin)
             and factor % power == 0
-            and np.max(np.abs(whole - float(origin)), initial=0) * (factor // power) < _LONGEST_NS
+            and (largest + float(origin)) * (factor // power) < 2 * _LONGEST_NS
         ):
-            return (whole.astype(np.int64) - int(origin)) * (factor // power)
+            ns = whole.astype(np.int64)
+            ns -= int(origin)
+            ns *= factor // power
+            return ns if np.max(np.abs(ns), initial=0) < _LONGEST_NS else None
     return None
 
 

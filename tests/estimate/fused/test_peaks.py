@@ -5,7 +5,8 @@ import pytest
 
 import asflown
 from asflown import fly
-from asflown.estimate.fused.peaks import PEAK_REACH_S, excursions, peak_scale
+from asflown.estimate.fused.peaks import peak_scale
+from asflown.kit.peaks import PEAK_REACH_S, excursions
 from asflown.sim.scenario.scenario import load_scenario
 from flights import CASSINI, flown
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import fdtri
+import scipy
 
 from ...kit.digits import interval
 from ...kit.doubts import Doubts, Kind, Severity
@@ -137,7 +137,7 @@ def fit_atmosphere(g: Gained, flyby: Flyby, closest_s: float, per_density, gravi
     def fitting(misfit):
         """Scale heights within the limit."""
         least = float(misfit.min())
-        limit = least + max(least / free, 1.0) * fdtri(1, free, 0.95)
+        limit = least + max(least / free, 1.0) * scipy.special.fdtri(1, free, 0.95)
         return np.flatnonzero(misfit <= limit), limit
 
     inside, _ = fitting(profile(_HEIGHTS_M)[2])

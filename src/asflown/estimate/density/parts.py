@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import chdtrc
+import scipy
 
 from ...kit.result import with_old_keys
 from ...kit.schema import Annotated, Doc, Interval, Number, TypedDict
@@ -129,7 +129,7 @@ class Agreement:
 
     @property
     def p(self) -> float:
-        return float(chdtrc(self.freedom, self.chi_square))
+        return float(scipy.special.chdtrc(self.freedom, self.chi_square))
 
     def record(self) -> dict:
         return {"chi_square": self.chi_square, "degrees_of_freedom": self.freedom, "p": self.p}

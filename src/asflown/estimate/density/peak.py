@@ -20,7 +20,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+import scipy
 
 from ...dynamics.plume import FARTHEST_M, Jet, jet_density
 from ..fused import AxisData, Regression, regression
@@ -129,7 +129,9 @@ def _shapes(flyby: Flyby, sources: tuple[Jet, ...]) -> _Shapes:
 
 def _local(torque: np.ndarray, time_s: np.ndarray) -> np.ndarray:
     """Size of a torque thereabouts. (N,)"""
-    return np.sqrt(gaussian_filter1d(torque**2, _NEARBY_S / float(np.mean(np.diff(time_s))), mode="nearest"))
+    return np.sqrt(
+        scipy.ndimage.gaussian_filter1d(torque**2, _NEARBY_S / float(np.mean(np.diff(time_s))), mode="nearest")
+    )
 
 
 def _positive(X: np.ndarray, y: np.ndarray, rng) -> np.ndarray:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Slerp
+import scipy
 
 from ...dynamics.orbit import BODIES
 from ...kit.doubts import Doubt, Kind, Severity
@@ -98,7 +98,7 @@ def attitude_at(telemetry: Telemetry, tai_ns: np.ndarray) -> np.ndarray | None:
     if len(at) < 2:
         return None
     t = (at - at[0]) / NS
-    return Slerp(t, rotation(q))(np.clip((tai_ns - at[0]) / NS, t[0], t[-1])).as_matrix()
+    return scipy.spatial.transform.Slerp(t, rotation(q))(np.clip((tai_ns - at[0]) / NS, t[0], t[-1])).as_matrix()
 
 
 def field_at_craft(telemetry: Telemetry, place: Place) -> tuple[Seen | None, str]:

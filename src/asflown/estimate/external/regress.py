@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtrit
+import scipy
 
 from ...kit.regression import memory
 from ...kit.scatter import robust_sigma
@@ -38,7 +38,7 @@ class Fit:
 
     @property
     def reach(self) -> float:
-        return float(stdtrit(max(self.worth - 2, 1.0), 0.975))
+        return float(scipy.special.stdtrit(max(self.worth - 2, 1.0), 0.975))
 
     def shift(self, change) -> np.ndarray:
         """What a change (N, 3) of the momentum does to the torque, (3,)."""

@@ -19,8 +19,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
-from scipy.spatial.transform import Rotation
+import scipy
 
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput, check_choice, some_of
@@ -250,7 +249,7 @@ class _Course:
     method: str
     frame: str
     y: np.ndarray
-    turned: Rotation
+    turned: scipy.spatial.transform.Rotation
     G: np.ndarray
     unknown: np.ndarray
     turn_from: str
@@ -277,7 +276,7 @@ class _Taken:
     errors: np.ndarray | None = None  # (N, 3, q)
     doubts: Doubts = Doubts()
 
-    def brought(self, s: Samples, turned: Rotation) -> np.ndarray:
+    def brought(self, s: Samples, turned: scipy.spatial.transform.Rotation) -> np.ndarray:
         """Momentum that the known torques brought since the first sample, (N, 3)."""
         if not self.names:
             return np.zeros_like(s.momentum)
@@ -288,7 +287,7 @@ class _Taken:
         errors = [t.errors_Nm for t in around.terms if t.errors_Nm is not None]
         R = turned.as_matrix()
         whole = np.concatenate([torque[:, :, None], *errors], axis=2)
-        grown = np.swapaxes(R, 1, 2) @ cumulative_trapezoid(R @ whole, s.seconds, axis=0, initial=0)
+        grown = np.swapaxes(R, 1, 2) @ scipy.integrate.cumulative_trapezoid(R @ whole, s.seconds, axis=0, initial=0)
         self.errors = grown[:, :, 1:]
         return grown[:, :, 0]
 
@@ -301,8 +300,10 @@ def _drift(subject: Subject, turn, taken: _Taken) -> ExternalTorqueResult:
     course = _Course(
         method="drift",
         frame="body",
-        y=H + np.cross(w, cumulative_trapezoid(H, t, axis=0, initial=0)) - taken.brought(s, Rotation.identity(len(t))),
-        turned=Rotation.identity(len(t)),
+        y=H
+        + np.cross(w, scipy.integrate.cumulative_trapezoid(H, t, axis=0, initial=0))
+        - taken.brought(s, scipy.spatial.transform.Rotation.identity(len(t))),
+        turned=scipy.spatial.transform.Rotation.identity(len(t)),
         G=t[:, None, None] * np.eye(3),
         unknown=_crossed(mean, np.full(3, w_unknown)),
         turn_from=turn_from,
@@ -351,11 +352,11 @@ def _momentum(subject: Subject, frame: str, taken: _Taken) -> ExternalTorqueResu
     elif frame == "inertial":
         raise BadInput("no quaternion: the inertial frame is not known", remedy="Use --frame body.")
     else:
-        from_start, turn_from = Rotation.identity(), "body rates"
+        from_start, turn_from = scipy.spatial.transform.Rotation.identity(), "body rates"
         unknown = _crossed(s.momentum.mean(axis=0), np.full(3, GYRO_BIAS))
         doubts.append(ATTITUDE_FROM_RATES())
     if frame == "body":
-        G = cumulative_trapezoid(s.turned.as_matrix(), t, axis=0, initial=0)
+        G = scipy.integrate.cumulative_trapezoid(s.turned.as_matrix(), t, axis=0, initial=0)
     else:
         G = t[:, None, None] * from_start.as_matrix()
     y = s.momentum - taken.brought(s, s.turned)

@@ -5,10 +5,9 @@ from .feed import Foreknown
 from .fuse import CONSIDERED, LOOP_NOT_USED, PRIORS, Fusion, fused
 from .gather import LOOPS, CannotFuse
 from .innovations import DELAY_OFF, KNOWN_OFF, UNEXPLAINED
-from .peaks import PEAK_REACH_S, excursions, heights
 from .whitening import Regression, regression
 
 __all__ = [
-    "CONSIDERED", "DELAY_OFF", "KNOWN_OFF", "LOOPS", "LOOP_NOT_USED", "PEAK_REACH_S", "PRIORS", "UNEXPLAINED", "AxisData",
-    "CannotFuse", "Foreknown", "Fusion", "Regression", "excursions", "fused", "hats", "heights", "regression",
+    "CONSIDERED", "DELAY_OFF", "KNOWN_OFF", "LOOPS", "LOOP_NOT_USED", "PRIORS", "UNEXPLAINED", "AxisData",
+    "CannotFuse", "Foreknown", "Fusion", "Regression", "fused", "hats", "regression",
 ]  # fmt: skip

@@ -106,7 +106,10 @@ class Body:
             Q[driven_state, driven_state] = drive * size_Nm**2
         A, fixed = discretize(F, Q, times.steps_s)
         driven, scale = np.empty((0, *A.shape)), np.empty((len(times.seconds), 0))
-        for state, by, size in ((driven_state, drive, None if one else size_Nm), (self.torque, 1 / self.inertia_kgm2**2, steps_Nm)):
+        for state, by, size in (
+            (driven_state, drive, None if one else size_Nm),
+            (self.torque, 1 / self.inertia_kgm2**2, steps_Nm),
+        ):
             if size is not None:
                 D = np.zeros_like(Q)
                 D[state, state] = by

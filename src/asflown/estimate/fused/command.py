@@ -12,10 +12,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
-from scipy.integrate import cumulative_trapezoid
-from scipy.interpolate import BSpline, CubicHermiteSpline, make_lsq_spline, make_smoothing_spline
-from scipy.spatial.transform import Rotation, Slerp
+import scipy
 
 from ...dynamics.loop import filtered_rate
 from ...kit.doubts import Doubts, Kind, Severity
@@ -71,7 +68,9 @@ class Command:
     fed_Nms: np.ndarray  # its integral
     variance: np.ndarray
     beside_Nm: np.ndarray
-    lag_rad: np.ndarray  # (M, 3), by which the attitude that the loop holds without a torque is behind the one commanded
+    lag_rad: (
+        np.ndarray
+    )  # (M, 3), by which the attitude that the loop holds without a torque is behind the one commanded
     source: str
     gyroscopic: bool
     acceleration_fed: bool
@@ -139,15 +138,15 @@ class HeldToOrbit:
     tai_ns: np.ndarray
     position: np.ndarray
     velocity: np.ndarray
-    turn: Rotation
+    turn: scipy.spatial.transform.Rotation
 
     def _orbit(self, tai_ns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         t = (self.tai_ns - self.tai_ns[0]) / NS
-        path = CubicHermiteSpline(t, self.position, self.velocity)
+        path = scipy.interpolate.CubicHermiteSpline(t, self.position, self.velocity)
         at = np.clip((tai_ns - self.tai_ns[0]) / NS, 0.0, t[-1])
         return path(at), np.column_stack([np.interp(at, t, v) for v in self.velocity.T])
 
-    def at(self, tai_ns: np.ndarray) -> Rotation:
+    def at(self, tai_ns: np.ndarray) -> scipy.spatial.transform.Rotation:
         """The attitude held, body to inertial."""
         return lvlh_to_inertial(*self._orbit(tai_ns)) * self.turn
 
@@ -169,7 +168,7 @@ def held_to_orbit(subject: Subject) -> HeldToOrbit | None:
     inside = (at >= tai_ns[0]) & (at <= tai_ns[-1]) if len(tai_ns) else np.zeros(len(at), bool)
     if len(tai_ns) < _FEWEST or np.mean(inside) < _COVERED or not np.all(np.linalg.norm(orbit[:, :3], axis=1) > 0):
         return None
-    held = HeldToOrbit(tai_ns, orbit[:, :3], orbit[:, 3:], Rotation.identity())
+    held = HeldToOrbit(tai_ns, orbit[:, :3], orbit[:, 3:], scipy.spatial.transform.Rotation.identity())
     off = held.at(at[inside]).inv() * rotation(q[inside])
     mean = off.mean()
     still = np.quantile((mean.inv() * off).magnitude(), 0.95) < _STILL_RAD
@@ -198,7 +197,7 @@ def command_of(
     doubts = Doubts([FED_OTHERWISE(said="does" if gyroscopic else "does not")] if stated > _PLAIN * other else ())
     pushed = gyroscopic if law.acceleration is None else law.acceleration
     feed = gyroscopic * turn + pushed * push
-    fed = gyroscopic * cumulative_trapezoid(turn, at, axis=0, initial=0) + pushed * (rate - rate[0]) @ J
+    fed = gyroscopic * scipy.integrate.cumulative_trapezoid(turn, at, axis=0, initial=0) + pushed * (rate - rate[0]) @ J
     beside = np.zeros(3)
     for j, of_axis in series.items():
         more = _beside(of_axis, fed[:, j], at, J[j, j] * law.kd_per_s, law)
@@ -218,10 +217,15 @@ def hold_of(subject: Subject, grid: Grid, series: dict[int, list[Series]]) -> Co
         slopes = np.diff(left[ends]) / np.diff(s[ends])
         error = float(np.std(slopes, ddof=1)) / np.sqrt(_PARTS)
         if abs(np.mean(slopes)) > _SURE * error:
-            lag[:, j], sigma[j] = -_smoothed(s, left, 1, *_smoothing(law, at)).at(at, 1) / _stiffness(law, J, j), _WIDE * error
+            lag[:, j], sigma[j] = (
+                -_smoothed(s, left, 1, *_smoothing(law, at)).at(at, 1) / _stiffness(law, J, j),
+                _WIDE * error,
+            )
     if not sigma.any():
         return None
-    return Command(at, none, none, none, none, np.zeros((2, 3)), sigma, lag, HOLD, gyroscopic=False, acceleration_fed=False)
+    return Command(
+        at, none, none, none, none, np.zeros((2, 3)), sigma, lag, HOLD, gyroscopic=False, acceleration_fed=False
+    )
 
 
 def _stiffness(law: WheelController, J: np.ndarray, j: int) -> float:
@@ -250,7 +254,7 @@ def _commanded(subject: Subject, grid: Grid, series, law: WheelController):
     if all(n in tlm for n in _COMMANDED):
         tai_ns, q = together(tlm, _COMMANDED)
         middle, between = rates_between(grid.of(tai_ns), q)
-        smooth = [make_smoothing_spline(middle, between[:, j]) for j in range(3)]
+        smooth = [scipy.interpolate.make_smoothing_spline(middle, between[:, j]) for j in range(3)]
         inside = np.clip(at, middle[0], middle[-1])
         rate = np.column_stack([f(inside) for f in smooth])
         return rate, np.column_stack([f.derivative()(inside) for f in smooth]), np.zeros((2, 3)), "commanded attitude"
@@ -262,7 +266,7 @@ def _commanded(subject: Subject, grid: Grid, series, law: WheelController):
         rate, push = (np.column_stack([f.at(at, k) for f in slow]) for k in (0, 1))
         return rate, push, np.array([f.variance for f in slow]).T, "LVLH of the orbit"
     measured = [next(s for s in series[j] if s.row == BODY_RATE) for j in range(3)]
-    fits = [_smoothed(s.seconds, ndimage.median_filter(s.values, 5), 0, most, block_s) for s in measured]
+    fits = [_smoothed(s.seconds, scipy.ndimage.median_filter(s.values, 5), 0, most, block_s) for s in measured]
     found = [np.column_stack([f.at(at, k) for f in fits]) for k in (0, 1)]
     source, variance = "smoothed body rates", np.array([f.variance for f in fits]).T
     if all(n in tlm for n in _QUATERNION):
@@ -281,10 +285,10 @@ def _from_attitude(subject: Subject, grid: Grid, series, rate: np.ndarray, most:
     s, commanded = s[inside], rotation(q[inside])
     errors = {j: x for j in range(3) for x in series[j] if x.row == ATTITUDE_ERROR}
     error = np.column_stack([np.interp(s, errors[j].seconds, errors[j].values) for j in range(3)])
-    commanded = commanded * Rotation.from_rotvec(error)
+    commanded = commanded * scipy.spatial.transform.Rotation.from_rotvec(error)
     acceleration, fits = np.gradient(rate, at, axis=0), []
     for _ in range(2):  # what is left of the first is of second order
-        made = Slerp(at, turned_by(at, rate))(np.clip(s, 0, at[-1]))
+        made = scipy.spatial.transform.Slerp(at, turned_by(at, rate))(np.clip(s, 0, at[-1]))
         off = (made.inv() * (commanded[0] * made[0].inv()).inv() * commanded).as_rotvec()
         fits = [_smoothed(s, off[:, j], 1, most, block_s) for j in range(3)]
         angle, more, curve = (np.column_stack([f.at(at, k) for f in fits]) for k in range(3))
@@ -297,7 +301,7 @@ def _from_attitude(subject: Subject, grid: Grid, series, rate: np.ndarray, most:
 class _Smooth:
     """A spline and the variance of the rate it stands for, and of that rate's derivative."""
 
-    spline: BSpline
+    spline: scipy.interpolate.BSpline
     variance: tuple[float, float]
 
     def at(self, seconds: np.ndarray, derivative: int) -> np.ndarray:
@@ -318,7 +322,7 @@ def _smoothed(seconds: np.ndarray, values: np.ndarray, order: int, most: int, bl
         if size > n // 3 and best is not None:
             break
         knots = np.concatenate([[0.0] * k, np.linspace(0, end, pieces + 1), [end] * k])
-        spline = make_lsq_spline(t, y, knots, k)
+        spline = scipy.interpolate.make_lsq_spline(t, y, knots, k)
         square = float(np.mean((y - spline(t)) ** 2)) + 1e-300
         score = n * np.log(square) + size * np.log(n)
         if best is None or score < best[0]:
@@ -342,7 +346,7 @@ def _left_beside(of_axis: list[Series], fed: np.ndarray, at: np.ndarray, gain: f
     """Instants, and the integral of what the actuators do beside the law and its feed-forward; as ``_beside``."""
     row = {s.row: s for s in of_axis}
     h, e = row[MOMENTUM], row[ATTITUDE_ERROR]
-    turned = cumulative_trapezoid(e.values, e.seconds, initial=0)
+    turned = scipy.integrate.cumulative_trapezoid(e.values, e.seconds, initial=0)
     asked = gain * (law.kp_per_s * np.interp(h.seconds, e.seconds, turned) + np.interp(h.seconds, e.seconds, e.values))
     return h.seconds, -h.values - asked - np.interp(h.seconds, at, fed)
 

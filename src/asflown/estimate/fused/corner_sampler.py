@@ -22,29 +22,46 @@ _BORN, _REMOVED, _MOVED, _SPLIT, _MERGED = 0.15, 0.30, 0.75, 0.85, 0.95
 
 
 @jit
-def _marginal(G, b, active, count, precision, L, z):
-    """Log evidence of a set of columns with their coefficients integrated out; leaves Cholesky's L and z = L^-1 b."""
-    total = 0.0
-    for r in range(count):
+def _marginal(G, b, active, count, precision, U, z, sums, first):
+    """Log evidence of a set of columns with their coefficients integrated out; leaves Cholesky's U = L^T, z = L^-1 b, and the sums of
+    the evidence's parts.  Those of the ``first`` entries are there already."""
+    row = np.empty(count)
+    for r in range(first, count):
         at = active[r]
         for c in range(r + 1):
-            s = G[at, active[c]]
-            if c == r:
-                s += precision[r]
-            for i in range(c):
-                s -= L[r, i] * L[c, i]
-            if c < r:
-                L[r, c] = s / L[c, c]
-            elif s > _ALONE * (G[at, at] + precision[r]):
-                L[r, r] = math.sqrt(s)
-            else:
-                return -np.inf
-        s = b[at]
-        for i in range(r):
-            s -= L[r, i] * z[i]
-        z[r] = s / L[r, r]
-        total += 0.5 * (z[r] * z[r] + math.log(precision[r])) - math.log(L[r, r])
-    return total
+            row[c] = G[at, active[c]]
+        row[r] += precision[r]
+        least = _ALONE * row[r]
+        for c in range(r):
+            x = row[c] / U[c, c]
+            U[c, r] = x
+            for i in range(c + 1, r + 1):  # along a row of U: the processor takes several at a time
+                row[i] -= x * U[c, i]
+        if not row[r] > least:
+            return -np.inf
+        U[r, r] = math.sqrt(row[r])
+        z[r] = b[at]
+    for r in range(count):
+        if r >= first:
+            z[r] /= U[r, r]
+            part = 0.5 * (z[r] * z[r] + math.log(precision[r])) - math.log(U[r, r])
+            sums[r] = part + (sums[r - 1] if r > 0 else 0.0)
+        for i in range(max(r + 1, first), count):
+            z[i] -= z[r] * U[r, i]
+    return sums[count - 1] if count > 0 else 0.0
+
+
+@jit
+def _as_before(active, precision, U, z, sums, count, active2, precision2, U2, z2, sums2):
+    """Take over what two sets have in common from their beginning; returns how many entries that is."""
+    same = 0
+    while same < count and active[same] == active2[same] and precision[same] == precision2[same]:
+        same += 1
+    for r in range(same):
+        z2[r], sums2[r] = z[r], sums[r]
+        for i in range(r, same):
+            U2[r, i] = U[r, i]
+    return same
 
 
 @jit
@@ -87,22 +104,17 @@ def sample(
     on = np.zeros(columns, np.bool_)
     active, active2 = np.zeros(most, np.int64), np.zeros(most, np.int64)
     precision, precision2 = np.zeros(most), np.zeros(most)
-    L, L2, z, z2, coefficient = (
-        np.zeros((most, most)),
-        np.zeros((most, most)),
-        np.zeros(most),
-        np.zeros(most),
-        np.zeros(most),
-    )
+    U, U2 = np.zeros((most, most)), np.zeros((most, most))
+    z, z2, sums, sums2, coefficient = np.zeros(most), np.zeros(most), np.zeros(most), np.zeros(most), np.zeros(most)
     for i in range(fixed):
         active[i], precision[i] = i, 1 / always[i] ** 2
     count, variance = fixed, size
     for c in corners:
         active[count], precision[count] = c, 1 / variance
-        if _marginal(G[level], b[level], active, count + 1, precision, L, z) > -np.inf:
+        if _marginal(G[level], b[level], active, count + 1, precision, U, z, sums, 0) > -np.inf:
             on[c] = True
             count += 1
-    now = _marginal(G[level], b[level], active, count, precision, L, z)
+    now = _marginal(G[level], b[level], active, count, precision, U, z, sums, 0)
     out, counts, levels = np.zeros((kept, columns)), np.zeros(kept, np.int64), np.zeros(kept, np.int64)
     taken = 0
     for n in range(proposals):
@@ -178,7 +190,10 @@ def sample(
                 new = _without(active, precision, count, -1, active2, precision2)
                 ratio = evidence[to] + prior[to] - evidence[level] - prior[level]
         if new > 0:
-            then = _marginal(G[to], b[to], active2, new, precision2, L2, z2)
+            same = 0
+            if to == level:
+                same = _as_before(active, precision, U, z, sums, min(count, new), active2, precision2, U2, z2, sums2)
+            then = _marginal(G[to], b[to], active2, new, precision2, U2, z2, sums2, same)
             if math.log(rng.random()) < then - now + ratio:
                 if gone >= 0:
                     on[gone] = False
@@ -189,14 +204,14 @@ def sample(
                 if second > 0:
                     on[second] = True
                 active, active2, precision, precision2 = active2, active, precision2, precision
-                L, L2, z, z2 = L2, L, z2, z
+                U, U2, z, z2, sums, sums2 = U2, U, z2, z, sums2, sums
                 count, now, level = new, then, to
         if n % 8 == 7:
             for r in range(count - 1, -1, -1):
                 s = z[r] + rng.standard_normal()
                 for i in range(r + 1, count):
-                    s -= L[i, r] * coefficient[i]
-                coefficient[r] = s / L[r, r]
+                    s -= U[r, i] * coefficient[i]
+                coefficient[r] = s / U[r, r]
             while taken < kept and (n - burn) * kept >= taken * (proposals - burn):
                 for i in range(count):
                     out[taken, active[i]] = coefficient[i]
@@ -212,9 +227,9 @@ def sample(
             then = (size + 0.5 * spread) / rng.gamma(1.0 + 0.5 * (count - fixed))
             for i in range(fixed, count):
                 precision2[i] /= then
-            after = _marginal(G[level], b[level], active, count, precision2, L2, z2)
+            after = _marginal(G[level], b[level], active, count, precision2, U2, z2, sums2, 0)
             if after > -np.inf:  # else rounding would decide: keep those before
                 now, variance = after, then
                 precision, precision2 = precision2, precision
-                L, L2, z, z2 = L2, L, z2, z
+                U, U2, z, z2, sums, sums2 = U2, U, z2, z, sums2, sums
     return out, counts, levels

@@ -20,13 +20,14 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+import scipy
 
 from ...kit.convergence import Convergence, worst
 from ...kit.ensemble import Gains, gains, paths, simulate, spread, whiten
+from ...kit.peaks import excursions
 from .body import AxisData, Posterior
 from .corner_sampler import sample
-from .peaks import excursions, peak_scale
+from .peaks import peak_scale
 from .suspects import NEAR_S, Suspects, suspects
 
 if TYPE_CHECKING:
@@ -318,7 +319,9 @@ def _ways(search: _Search, count: int) -> tuple[list[_Way], np.ndarray]:
     ).bends
     square = np.mean(search.lines(first) ** 2, axis=0)
     # the instants are nearly even, and the neighbourhood need not be exact
-    size = np.sqrt(gaussian_filter1d(square, _NEARBY_S / float(np.mean(np.diff(times.seconds))), mode="nearest"))
+    size = np.sqrt(
+        scipy.ndimage.gaussian_filter1d(square, _NEARBY_S / float(np.mean(np.diff(times.seconds))), mode="nearest")
+    )
     ways = [
         plain,
         *[search.way(r * size, s) for r, s in ROUGHNESS],

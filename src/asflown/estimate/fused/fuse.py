@@ -345,7 +345,9 @@ def _carried(subject: Subject, axes, record: Record, motion: _Motion, fits: dict
 
     again = {
         j: series[-1]
-        for j, series in gather(subject, axes, record.loop, stored, follow=record.loop == "modelled" and not record.still).series.items()
+        for j, series in gather(
+            subject, axes, record.loop, stored, follow=record.loop == "modelled" and not record.still
+        ).series.items()
     }
     return {
         j: replace(f, series=tuple(again[j] if s.row == again[j].row else s for s in f.series)) for j, f in fits.items()

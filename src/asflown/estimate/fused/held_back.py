@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import linalg
+import scipy
 
 from ...kit.ensemble import gains, whiten
 from .body import AxisData, Body, Levels
@@ -48,9 +48,9 @@ def predict(body: Body, levels: Levels, series: list[Series], held: list[np.ndar
     columns[which, np.arange(len(which))] = 1
     g = gains(axis.model, data)
     X = whiten(g, columns)
-    L = linalg.cholesky(X.T @ X, lower=True)
-    white = linalg.solve_triangular(L, X.T @ g.own, lower=True)
-    root = linalg.solve_triangular(L, np.eye(len(which)), lower=True)  # covariance = root' root
+    L = scipy.linalg.cholesky(X.T @ X, lower=True)
+    white = scipy.linalg.solve_triangular(L, X.T @ g.own, lower=True)
+    root = scipy.linalg.solve_triangular(L, np.eye(len(which)), lower=True)  # covariance = root' root
     error, sigma = root.T @ white, np.sqrt(np.sum(root**2, axis=0))
     return HeldBack(axis.channel[which][::-1], axis.time_s[step][::-1], (error / sigma)[::-1], white[::-1])
 

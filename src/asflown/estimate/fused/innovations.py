@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from ...kit.doubts import Doubt, Kind, Severity
 from .series import ROWS
@@ -48,7 +48,7 @@ class Innovations:
         power = float(np.sum(centred**2))
         r = np.array([np.sum(centred[k:] * centred[:-k]) for k in lags]) / power
         Q = n * (n + 2) * np.sum(r**2 / (n - lags))
-        return cls(n, float(np.mean(whitened**2)), float(r[0]), float(stats.chi2.sf(Q, len(lags))))
+        return cls(n, float(np.mean(whitened**2)), float(r[0]), float(scipy.stats.chi2.sf(Q, len(lags))))
 
 
 def by_channel(whitened: np.ndarray, row: np.ndarray) -> dict[str, Innovations]:

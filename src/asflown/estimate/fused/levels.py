@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize
+import scipy
 
 from ...kit.doubts import Doubt, Kind, Severity
 from ...kit.smoother import log_likelihood, score, smooth
@@ -30,8 +30,10 @@ _REACH_S = 3.0
 _MOST_FITTED, _BLOCKS = 9000, 3
 #: Steps of a level's logarithm: of the model's matrices, where rounding is the only limit, and of the likelihood itself.
 _STEP, _WIDE_STEP = 1e-6, 1e-3
-#: Where the search of levels ends: a gain below a share of the likelihood that is no thousandth of one in a usual record.
-_ENDS = {"maxiter": 100, "ftol": 1e-8, "gtol": 1e-2}
+#: Where the search of levels ends: a slope at which they are within some thousandths of their sigma; or, within bounds of so many
+#: sigmas of the prior, a gain below a share of the likelihood that is no thousandth of one in a usual record.
+_ENDS = {"maxiter": 100, "gtol": 1e-2}
+_FURTHEST, _BOUNDED_ENDS = 6.0, {"maxiter": 100, "ftol": 1e-8, "gtol": 1e-2}
 #: The cost of levels under which the record cannot be.
 _IMPOSSIBLE = 1e10
 
@@ -103,7 +105,11 @@ def _without_outliers(body: Body, levels: Levels, series, known: Known | None, l
         if left_out > most:
             return series
         if not len(worst):
-            return [_with_stretches(before, after) for before, after in zip(series, kept, strict=True)] if left_out else series
+            return (
+                [_with_stretches(before, after) for before, after in zip(series, kept, strict=True)]
+                if left_out
+                else series
+            )
         kept = _without(kept, axis, worst)
 
 
@@ -139,7 +145,10 @@ def _most_probable(body: Body, centre: Levels, start: Levels, series, known: Kno
         return -value + 0.5 * z @ z, z - spread * slope
 
     z = (start.logs() - middle) / spread
-    found = optimize.minimize(cost, z, method="L-BFGS-B", jac=True, bounds=[(-6.0, 6.0)] * len(z), options=_ENDS)
+    found = scipy.optimize.minimize(cost, z, method="BFGS", jac=True, options=_ENDS)
+    if not found.success or np.max(np.abs(found.x)) > _FURTHEST:  # as where a channel has no noise at all
+        bounds = [(-_FURTHEST, _FURTHEST)] * len(z)
+        found = scipy.optimize.minimize(cost, z, method="L-BFGS-B", jac=True, bounds=bounds, options=_BOUNDED_ENDS)
     return kind.from_logs(middle + spread * found.x)
 
 

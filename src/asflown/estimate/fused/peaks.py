@@ -15,36 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...kit.ensemble import _ONE_SIGMA, spread
-
-#: Half of a peak's surroundings in which each drawn torque's own extremum is looked for: room for a doubtful corner's
-#: time.  Further out the highest of a rough torque's many is too high (of a cover's, by 5 % at 5 s, 0.6 % at 2.5 s). [s]
-PEAK_REACH_S = 2.5
-#: An excursion stands out from its surroundings by this share of the largest torque.
-_STANDS_OUT = 0.25
-#: And its height is this many of its sigmas.
-_SURE = 4.0
-
-
-def excursions(torque: np.ndarray, sigma: np.ndarray | None = None) -> np.ndarray:
-    """Indices of the excursions of either sign of a torque (M,), NaN where unknown. [N m]
-
-    They are above four times their sigma (M,), if there is one, and stand out from their surroundings by a share of the largest of these."""
-    known = np.isfinite(torque)
-    sure = known if sigma is None else known & (np.abs(torque) > _SURE * sigma)
-    if known.sum() < 3 or not np.any(torque[sure]):
-        return np.empty(0, np.intp)
-    least, filled = _STANDS_OUT * np.max(np.abs(torque[sure])), np.where(known, torque, 0.0)
-    from scipy.signal import find_peaks  # half a second of import that only this needs
-
-    found = [find_peaks(sign * filled, height=least, prominence=least)[0] for sign in (1, -1)]
-    at = np.sort(np.concatenate(found))
-    return at[sure[at]]
-
-
-def heights(time_s: np.ndarray, torques: np.ndarray, at_s: float, reach_s: float, sign: float) -> np.ndarray:
-    """Each torque's own extremum (...) of a sign within reach of a time; ``torques``: (..., M). [N m]"""
-    near = np.abs(time_s - at_s) <= reach_s + 1e-9
-    return sign * np.max(sign * torques[..., near], axis=-1)
+from ...kit.peaks import PEAK_REACH_S, heights
 
 
 def peak_scale(time_s: np.ndarray, mean: np.ndarray, at: np.ndarray, true: np.ndarray, drawn: np.ndarray) -> float:

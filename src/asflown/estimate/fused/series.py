@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from ...kit.regression import noise_sigma
 from ...kit.scatter import robust_sigma
@@ -43,7 +43,7 @@ class Series:
 
         A jump is a step far from those around it; a steady rise has none."""
         step, dt = np.diff(self.values), np.diff(self.seconds)
-        odd = np.abs(step - ndimage.median_filter(step, 5))
+        odd = np.abs(step - scipy.ndimage.median_filter(step, 5))
         rate = np.where(odd > _A_JUMP * max(robust_sigma(odd), self.quantum), odd / dt, 0.0)
         steep = np.maximum(np.append(rate, 0.0), np.append(0.0, rate))
         return replace(self, steep=steep if steep.any() else None)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import optimize
+import scipy
 
 from ...kit.smoother import Model, log_likelihood, score
 
@@ -127,5 +127,5 @@ def _between(axis: AxisData, start: Levels, edges: np.ndarray) -> tuple[Levels, 
 
     corners = start.logs()[:2] + np.array([[0, 0], [0.7, 0], [0, 0.5]])
     how = {"maxfev": 25, "xatol": 0.05, "fatol": 0.2, "initial_simplex": corners}
-    found = optimize.minimize(lambda p: _cost(axis, of(p), edges), corners[0], method="Nelder-Mead", options=how)
+    found = scipy.optimize.minimize(lambda p: _cost(axis, of(p), edges), corners[0], method="Nelder-Mead", options=how)
     return of(found.x), float(found.fun)

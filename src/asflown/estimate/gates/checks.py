@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import comb
+from math import comb, erf
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+import scipy
 
 if TYPE_CHECKING:
     from ...maneuvers.model import Quantity
 
 #: Share of a normal distribution inside one sigma.
-INSIDE = float(stats.norm.cdf(1) - stats.norm.cdf(-1))
+INSIDE = erf(2**-0.5)
 
 
 @dataclass(frozen=True)
@@ -30,16 +30,16 @@ class Shape:
     def normal_quantiles(self) -> np.ndarray:
         """What is to be expected of M sorted normal numbers, (M,)."""
         n = len(self.quantiles)
-        return stats.norm.ppf((np.arange(n) + 0.5) / n)
+        return scipy.stats.norm.ppf((np.arange(n) + 0.5) / n)
 
     @property
     def pit(self) -> np.ndarray:
         """Probability integral transform of every error: uniform where the model is right, (M,)."""
-        return stats.norm.cdf(self.quantiles)
+        return scipy.stats.norm.cdf(self.quantiles)
 
     def count_band(self, bins: int) -> tuple[float, float]:
         """How many errors a bin of the transform holds in 95 of 100 sets."""
-        low, high = stats.binom.interval(0.95, len(self.quantiles), 1 / bins)
+        low, high = scipy.stats.binom.interval(0.95, len(self.quantiles), 1 / bins)
         return float(low), float(high)
 
 
@@ -69,7 +69,7 @@ class Spread:
     def record(self) -> dict:
         counts = None
         if self.standardised is not None:
-            counts = np.histogram(stats.norm.cdf(self.standardised), bins=10, range=(0, 1))[0].tolist()
+            counts = np.histogram(scipy.stats.norm.cdf(self.standardised), bins=10, range=(0, 1))[0].tolist()
         return {
             "name": self.name, "count": self.count, "below_zero": self.below, "above_zero": self.count - self.below, "sign_p": self.sign_p,
             "inside_1_sigma": self.inside, "inside_model_1_sigma": self.inside_model, "inside_band95": None if self.band is None else list(self.band),
@@ -97,12 +97,12 @@ class Spread:
 
 def sign_test(below: int, count: int) -> float:
     """p-value of as uneven a split of signs, by a fair coin."""
-    return float(stats.binomtest(below, count).pvalue) if count else 1.0
+    return float(scipy.stats.binomtest(below, count).pvalue) if count else 1.0
 
 
 def inside_band(count: int) -> tuple[int, int]:
     """How many of ``count`` errors are inside one sigma in 95 of 100 sets."""
-    low, high = stats.binom.interval(0.95, count, INSIDE)
+    low, high = scipy.stats.binom.interval(0.95, count, INSIDE)
     return int(low), int(high)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import special
+import scipy
 
 if TYPE_CHECKING:
     from ...maneuvers.model import Gates
@@ -32,13 +32,15 @@ class Foreseen:
     def p_value(self, error) -> float:
         """How often chance alone goes as far, in whatever direction."""
         c, d2 = len(self.mean), self.distance2(error)
-        return float(special.chdtrc(c, d2) if np.isinf(self.freedom) else special.fdtrc(c, self.freedom, d2 / c))
+        return float(
+            scipy.special.chdtrc(c, d2) if np.isinf(self.freedom) else scipy.special.fdtrc(c, self.freedom, d2 / c)
+        )
 
     def z(self, error) -> float:
         """Of one component: signed, in sigmas.  Of two: the distance that chance goes as often in one."""
         if len(self.mean) == 1:
             return float((np.atleast_1d(error)[0] - self.mean[0]) / np.sqrt(self.covariance[0, 0]))
-        return float(-special.ndtri(max(self.p_value(error), 1e-300) / 2))
+        return float(-scipy.special.ndtri(max(self.p_value(error), 1e-300) / 2))
 
     def score(self, error) -> float:
         """One component's z as a standard normal one, whatever the degrees of freedom."""
@@ -46,7 +48,7 @@ class Foreseen:
         return (
             z
             if np.isinf(self.freedom)
-            else float(-np.sign(z) * special.ndtri(max(special.stdtr(self.freedom, -abs(z)), 1e-300)))
+            else float(-np.sign(z) * scipy.special.ndtri(max(scipy.special.stdtr(self.freedom, -abs(z)), 1e-300)))
         )
 
 

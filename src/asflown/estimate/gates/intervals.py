@@ -7,7 +7,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import optimize, stats
+import scipy
 
 if TYPE_CHECKING:
     from .likelihood import Point, Problem
@@ -33,9 +33,9 @@ def _cuts() -> tuple[np.ndarray, np.ndarray]:
             low = -root
         else:
             low = -np.inf if distance == 0 else (distance**2 - cut) / (2 * distance) - distance
-        return stats.norm.cdf(root) - stats.norm.cdf(low) - 0.95
+        return scipy.stats.norm.cdf(root) - scipy.stats.norm.cdf(low) - 0.95
 
-    return far, np.array([optimize.brentq(accepted, 1.0, 5.0, args=(x,)) for x in far])
+    return far, np.array([scipy.optimize.brentq(accepted, 1.0, 5.0, args=(x,)) for x in far])
 
 
 def sigma_interval(problem: Problem, best: Point, which: int) -> Ends:
@@ -67,7 +67,7 @@ def _crossing(beyond, inside: float, outside: float, step: float) -> float:
     if beyond(inside) >= 0:
         return inside
     low, high = sorted((inside, outside))
-    return float(optimize.brentq(beyond, low, high, xtol=step))
+    return float(scipy.optimize.brentq(beyond, low, high, xtol=step))
 
 
 def _cut(problem: Problem, at: Point, which: int) -> float:
@@ -87,7 +87,7 @@ def bias_intervals(problem: Problem, best: Point) -> list[Ends]:
     M, p = problem.X.shape
     if p == 0 or M <= p:
         return [(None, None)] * p
-    t = stats.t.ppf(0.975, M - p)
+    t = scipy.stats.t.ppf(0.975, M - p)
     cut = M * np.log1p(t * t / (M - p))
     full = replace(problem, reml=False)
     top = full.minimum(near=best)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput
@@ -102,7 +102,7 @@ def gates_judgement(
         variant=fit.variant,
         spreads=spreads,
         outliers=outliers,
-        expected_beyond_2_sigma=2 * float(stats.norm.sf(SIGMAS)) * len(m) * len(fit.parts) if influence else 0.0,
+        expected_beyond_2_sigma=2 * float(scipy.stats.norm.sf(SIGMAS)) * len(m) * len(fit.parts) if influence else 0.0,
         influence=influence,
         sufficient=None if worst is None or worst.largest is None else worst.in_sigmas <= _MOVED,
         directions=directions_of(m.across[0]) if m.pointing_error_mps is not None else None,
@@ -151,7 +151,7 @@ def _shape(part: Part, drawn, rng) -> Shape:
     steps = np.arange(n + 1) / n
 
     def farthest(z):
-        u = stats.norm.cdf(z)
+        u = scipy.stats.norm.cdf(z)
         return np.maximum(steps[1:] - u, u - steps[:-1]).max(axis=-1)
 
     p = (1 + np.sum(farthest(theirs) >= farthest(ours))) / (1 + len(theirs))
@@ -183,7 +183,7 @@ def _left_out(fit: GatesResult) -> tuple[tuple[Outlier, ...], tuple[Influence, .
             turned = part.point.beta * point.beta < 0
             flips += [t for t, flipped in zip(part.terms[2:], turned, strict=True) if flipped]
         moved.append(Influence(name, changes, largest[0], float(largest[1]), tuple(flips)))
-    q = stats.false_discovery_control([p for *_, p in seen])
+    q = scipy.stats.false_discovery_control([p for *_, p in seen])
     beyond = [Outlier(*s, float(adjusted)) for s, adjusted in zip(seen, q, strict=True)]
     return tuple(sorted((o for o in beyond if abs(o.z) > SIGMAS or o.discovered), key=lambda o: o.p)), tuple(moved)
 
@@ -200,7 +200,7 @@ def _against(fit: GatesResult, past: PastModel) -> Against:
             inside[2:] = [None] * len(inside[2:])
         consistent[part.quantity] = part.gathered(inside)
         gain += part.log_likelihood - part.problem.log_likelihood(part.problem.at(theirs[0], theirs[1], theirs[2:]))
-    tail = min(stats.chi2.sf(chi2, freedom), stats.chi2.cdf(chi2, freedom))
+    tail = min(scipy.stats.chi2.sf(chi2, freedom), scipy.stats.chi2.cdf(chi2, freedom))
     spreads = tuple(_spreads_under(left, fit))
     return Against(past.model.name, spreads, consistent, float(gain), float(chi2), float(2 * tail), freedom)
 

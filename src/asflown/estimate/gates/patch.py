@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from ...kit.digits import plus_minus
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
@@ -161,7 +161,7 @@ def gates_patch(
     before, b, B = _epoch("before, adjusted", adjusted.take(slice(0, at)), point, spare)
     after, a, A = _epoch("after", adjusted.take(slice(at, None)), point, spare)
     off = a - b
-    difference = float(stats.f.sf(off @ np.linalg.solve(A + B, off) / 2, 2, spare))
+    difference = float(scipy.stats.f.sf(off @ np.linalg.solve(A + B, off) / 2, 2, spare))
     return GatesPatch(
         first_after=first_after,
         removed_fixed_mps=removed_fixed_mps,
@@ -187,7 +187,7 @@ def _epoch(name: str, m: Maneuvers, point: Point, spare: int) -> tuple[Epoch, np
     X = np.stack([np.ones_like(v), v], axis=1)
     covariance = np.linalg.pinv(X.T @ (w[:, None] * X), hermitian=True)
     bias = covariance @ X.T @ (w * m.magnitude_error_mps)
-    p = float(stats.f.sf(bias @ np.linalg.pinv(covariance, hermitian=True) @ bias / 2, 2, spare))
+    p = float(scipy.stats.f.sf(bias @ np.linalg.pinv(covariance, hermitian=True) @ bias / 2, 2, spare))
     (fixed, proportional), sigma = bias.tolist(), np.sqrt(np.diag(covariance)).tolist()
     below = int(np.sum(m.magnitude_error_mps < 0))
     epoch = Epoch(name, len(m), below, sign_test(below, len(m)), fixed, sigma[0], proportional, sigma[1], p)

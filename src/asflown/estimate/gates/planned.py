@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from ...kit.digits import plus_minus
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
@@ -80,7 +80,7 @@ class PlannedError:
     @property
     def ellipsoid_mps(self) -> np.ndarray:
         """Semi-axes (3,) of the ellipsoid that holds 95 of 100 errors, along TVC X, Y, Z."""
-        return np.sqrt(stats.chi2.ppf(_CONFIDENCE, 3) * np.diag(self.covariance_m2_s2))
+        return np.sqrt(scipy.stats.chi2.ppf(_CONFIDENCE, 3) * np.diag(self.covariance_m2_s2))
 
     def samples(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """Errors drawn, (count, 3), TVC. [m/s]"""

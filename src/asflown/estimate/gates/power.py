@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import optimize, special
+import scipy
 
 if TYPE_CHECKING:
     from .foreseen import Foreseen
@@ -45,7 +45,7 @@ def detectable(told: Foreseen, limit_p: float, power: float = POWER) -> float:
     """Underburn that raises the alarm by itself with this probability, of a burn foreseen so. [m/s]"""
     sigma, cut, freedom = _sigma(told), _cut(told, limit_p), _freedom(told)
     sure = sigma * np.sqrt(freedom * (cut * cut + freedom - 1) / (freedom - 1))
-    return float(optimize.brentq(lambda d: alarm_chance(told, d, limit_p) - power, 0.0, sure, xtol=1e-9 * sure))
+    return float(scipy.optimize.brentq(lambda d: alarm_chance(told, d, limit_p) - power, 0.0, sure, xtol=1e-9 * sure))
 
 
 def _beyond(x: float, cut: float, f: float) -> float:
@@ -58,10 +58,10 @@ def _beyond(x: float, cut: float, f: float) -> float:
         q = 1 - 1e-9
     near, far = ((cut - s * x * np.sqrt(inside)) / (1 - q) for s in (1, -1))
     if q < 1:  # one of both roots has cut - w on the side of x
-        return float(special.stdtr(f - 1, -near))
+        return float(scipy.special.stdtr(f - 1, -near))
     if x < 0:
         return 0.0
-    return float(special.stdtr(f - 1, -max(near, far)) + special.stdtr(f - 1, min(near, far)))
+    return float(scipy.special.stdtr(f - 1, -max(near, far)) + scipy.special.stdtr(f - 1, min(near, far)))
 
 
 def _sigma(told: Foreseen) -> float:
@@ -74,4 +74,4 @@ def _freedom(told: Foreseen) -> float:
 
 def _cut(told: Foreseen, limit_p: float) -> float:
     """Error in sigmas at which one burn raises the alarm."""
-    return float(-special.stdtrit(min(told.freedom, 1e9), limit_p / 2))
+    return float(-scipy.special.stdtrit(min(told.freedom, 1e9), limit_p / 2))

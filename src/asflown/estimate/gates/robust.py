@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy import integrate, optimize, special, stats
+import scipy
 
 from . import kernel
 from .kernel import FREEDOM
@@ -29,11 +29,11 @@ def scale_of(components: int) -> float:
 
     def excess(c: float) -> float:
         def pull(x):
-            return stats.chi2.pdf(x, components) * (FREEDOM + components) * x / (FREEDOM * c * c + x)
+            return scipy.stats.chi2.pdf(x, components) * (FREEDOM + components) * x / (FREEDOM * c * c + x)
 
-        return integrate.quad(pull, 0, np.inf)[0] - components
+        return scipy.integrate.quad(pull, 0, np.inf)[0] - components
 
-    return float(optimize.brentq(excess, 0.3, 1.5))
+    return float(scipy.optimize.brentq(excess, 0.3, 1.5))
 
 
 @dataclass(frozen=True)
@@ -69,5 +69,9 @@ class RobustProblem(Problem):
         m = m[m > 0]
         scale2 = self.variances(point) * (self._scale * self.size) ** 2
         tails = 0.5 * (FREEDOM + m) * np.log((FREEDOM + m) / (FREEDOM * self.weights(point)))
-        norm = special.gammaln((FREEDOM + m) / 2) - special.gammaln(FREEDOM / 2) - 0.5 * m * np.log(FREEDOM * np.pi)
+        norm = (
+            scipy.special.gammaln((FREEDOM + m) / 2)
+            - scipy.special.gammaln(FREEDOM / 2)
+            - 0.5 * m * np.log(FREEDOM * np.pi)
+        )
         return float(np.sum(norm - tails) - 0.5 * np.sum(np.log(scale2)))

@@ -13,7 +13,7 @@ from functools import cache
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
-from scipy import optimize, stats
+import scipy
 
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput
@@ -349,14 +349,14 @@ def cusum_limit(steps: int, share: float) -> float:
         width = limit / (n - 0.5)
         centre = width * np.arange(n)  # the first state is zero, half as wide
         edge = np.concatenate([[-np.inf], centre[:-1] + width / 2, [limit]])
-        moves = np.diff(stats.norm.cdf(edge[None, :] - centre[:, None] + _REFERENCE), axis=1)
+        moves = np.diff(scipy.stats.norm.cdf(edge[None, :] - centre[:, None] + _REFERENCE), axis=1)
         chance = np.zeros(n)
         chance[0] = 1.0
         for _ in range(steps):
             chance = chance @ moves
         return 1 - float(chance.sum())
 
-    return float(optimize.brentq(lambda h: passed(h) - share, 0.3, 30.0, xtol=1e-4))
+    return float(scipy.optimize.brentq(lambda h: passed(h) - share, 0.3, 30.0, xtol=1e-4))
 
 
 def _doubts(m: Maneuvers, burns: list[Watched], against: PastModel | None) -> Iterator[Doubt]:

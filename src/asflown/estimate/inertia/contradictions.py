@@ -7,7 +7,7 @@ from itertools import combinations, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from ...dynamics.rigid_body import tensor_of
 from ...kit.doubts import Doubts, Kind, Severity
@@ -106,7 +106,9 @@ def _residual(record: SlewRecord):
 
 def _step_of_momentum(time_s: np.ndarray, residual_N: np.ndarray, arc: np.ndarray) -> float | None:
     """Where one step would take most off a residual momentum (N, 3), inertial axes, if it is plain. [s]"""
-    quick = residual_N - ndimage.median_filter(residual_N, size=(31, 1), mode="nearest")  # without the step itself
+    quick = residual_N - scipy.ndimage.median_filter(
+        residual_N, size=(31, 1), mode="nearest"
+    )  # without the step itself
     noise = np.sqrt(max(memory(column) for column in quick.T))  # neighbours that err alike are worth less
     noise *= robust_sigma(quick)
     best, at = _STEP_SEEN, None

@@ -17,7 +17,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
+import scipy
 
 from ...dynamics.environment import gravity_gradient_regressor
 from ...dynamics.rigid_body import ELEMENTS, elements_of, momentum_regressor, tensor_of
@@ -170,9 +170,17 @@ class _Stretch:
         pull = gravity_gradient_regressor(r.inv().apply(values[:, 10:13]))
         waves = [np.ones_like(angle), *(f(n * angle) for n in (1, 2) for f in (np.cos, np.sin))]
         steady = [np.eye(3) * w[:, None, None] for w in waves]
-        columns = -cumulative_trapezoid(R @ np.concatenate([pull, *steady], axis=2), t, axis=0, initial=0)
+        columns = -scipy.integrate.cumulative_trapezoid(
+            R @ np.concatenate([pull, *steady], axis=2), t, axis=0, initial=0
+        )
         columns[:, :, :6] += R @ momentum_regressor(omega)
-        return cls(t, R, omega, columns, cumulative_trapezoid(np.einsum("nij,nj->ni", R, u), t, axis=0, initial=0))
+        return cls(
+            t,
+            R,
+            omega,
+            columns,
+            scipy.integrate.cumulative_trapezoid(np.einsum("nij,nj->ni", R, u), t, axis=0, initial=0),
+        )
 
     def rows(self, block_s: float):
         """(time, X (3, 21), y (3,), rate) of each pair of neighbouring blocks, axes of the body between them."""

@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput, some_of
@@ -276,7 +276,7 @@ class _Reader:
         lead = rotation(q[first])
         away = (lead[block].inv() * rotation(q)).as_rotvec()
         at, turned, count = self.blocks.averaged(t, away)
-        return AttitudeSamples(at, quaternion(lead * Rotation.from_rotvec(turned)), count)
+        return AttitudeSamples(at, quaternion(lead * scipy.spatial.transform.Rotation.from_rotvec(turned)), count)
 
     # ---- thrusters ----
 

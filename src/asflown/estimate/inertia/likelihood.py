@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy import optimize
+import scipy
 
 from ...kit.errors import BadInput
 from ...kit.regressed import Disturbances, Filtered, Steps, run, smooth
@@ -117,7 +117,7 @@ def likeliest(weighted: Weighted, levels: Levels, around: Around | None) -> Leve
     low, high = np.maximum(np.log(first) - reach, np.log([floor[n] for n in names])), np.log(first) + reach
     for n in _LASTS.keys() & set(names):
         high[names.index(n)] = np.log(_LASTS[n][1])
-    best = optimize.minimize(cost, np.log(first), jac=True, method="L-BFGS-B", bounds=list(zip(low, high, strict=True)),
+    best = scipy.optimize.minimize(cost, np.log(first), jac=True, method="L-BFGS-B", bounds=list(zip(low, high, strict=True)),
                              options={"maxiter": 6, "ftol": 1e-7})  # fmt: skip
     return replace(levels, **dict(zip(names, np.exp(best.x).tolist(), strict=True)))
 

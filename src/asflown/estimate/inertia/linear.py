@@ -17,7 +17,7 @@ from math import factorial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from ...dynamics.momentum import grown_by
 from ...dynamics.rigid_body import momentum_regressor
@@ -197,11 +197,11 @@ def _transitions(motion: Motion, n: int) -> tuple[np.ndarray, np.ndarray]:
     """How departures go over from step to step, (N, n, n), and what the reference itself departs by, (N, n)."""
     dt, N = np.diff(motion.time_s), len(motion.time_s)
     r = rotation(motion.q_NB)
-    turn = Rotation.from_rotvec(turned(motion.omega_B[:-1], motion.alpha_B[:-1], dt))
+    turn = scipy.spatial.transform.Rotation.from_rotvec(turned(motion.omega_B[:-1], motion.alpha_B[:-1], dt))
     A = np.zeros((N, n, n))
     A[1:, :3, :3] = turn.inv().as_matrix()
     # a departure in rate turns with the body while it adds up: half the turn, on average
-    half = Rotation.from_rotvec(-0.5 * motion.omega_B[:-1] * dt[:, None]).as_matrix()
+    half = scipy.spatial.transform.Rotation.from_rotvec(-0.5 * motion.omega_B[:-1] * dt[:, None]).as_matrix()
     A[1:, :3, 3:6] = half * dt[:, None, None]
     A[1:, :3, 6:9] = half * (0.5 * dt**2)[:, None, None]
     A[:, range(3, n), range(3, n)] = 1.0

@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from ...dynamics.rigid_body import tensor_of
 from ...kit.rotations import quaternion, rates_between, rotation, turned_by
@@ -102,13 +102,13 @@ class Motion:
     def at(self, time_s: np.ndarray) -> Motion:
         k = np.clip(np.searchsorted(self.time_s, time_s + SAME_S) - 1, 0, len(self.time_s) - 1)
         dt = time_s - self.time_s[k]
-        turn = Rotation.from_rotvec(turned(self.omega_B[k], self.alpha_B[k], dt))
+        turn = scipy.spatial.transform.Rotation.from_rotvec(turned(self.omega_B[k], self.alpha_B[k], dt))
         omega = self.omega_B[k] + self.alpha_B[k] * dt[:, None]
         return Motion(time_s, quaternion(rotation(self.q_NB[k]) * turn), omega, self.alpha_B[k])
 
     def moved(self, departure: np.ndarray) -> Motion:
         """By angle, rate and acceleration (N, >= 9)."""
-        q = quaternion(rotation(self.q_NB) * Rotation.from_rotvec(departure[:, :3]))
+        q = quaternion(rotation(self.q_NB) * scipy.spatial.transform.Rotation.from_rotvec(departure[:, :3]))
         return Motion(self.time_s, q, self.omega_B + departure[:, 3:6], self.alpha_B + departure[:, 6:9])
 
 
@@ -128,7 +128,7 @@ def first_motion(record: SlewRecord, time_s: np.ndarray) -> Motion:
         r = rotation(record.attitude.q_NB)
         mid, step = rates_between(tq, record.attitude.q_NB)
         k = np.clip(np.searchsorted(tq, time_s + SAME_S) - 1, 0, len(step) - 1)
-        q = quaternion(r[k] * Rotation.from_rotvec(step[k] * (time_s - tq[k])[:, None]))
+        q = quaternion(r[k] * scipy.spatial.transform.Rotation.from_rotvec(step[k] * (time_s - tq[k])[:, None]))
         if not record.has_rates:
             omega = np.stack([np.interp(time_s, mid, step[:, j]) for j in range(3)], axis=1)
     else:

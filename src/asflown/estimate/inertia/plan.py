@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from ...dynamics.rigid_body import ELEMENTS
 from ...kit.digits import scaled_unit
@@ -510,7 +510,7 @@ class _Wheels:
         r = turn.rate_at(t)
         turned = np.concatenate([[0.0], np.cumsum(0.5 * (r[1:] + r[:-1]) * np.diff(t))])
         h0 = (self.spin * self.start) @ self.axes
-        back = Rotation.from_rotvec((-turned[None, :, None] * axes[:, None, :]).reshape(-1, 3))
+        back = scipy.spatial.transform.Rotation.from_rotvec((-turned[None, :, None] * axes[:, None, :]).reshape(-1, 3))
         h = back.apply(h0).reshape(len(axes), len(t), 3) - r[None, :, None] * (axes @ I_B)[:, None, :]
         share = np.linalg.pinv((self.spin[:, None] * self.axes).T)  # rate of each wheel per momentum
         rates = self.start + (h - h0) @ share.T

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
+import scipy
 
 from ...dynamics.environment import gravity_gradient_regressor
 from ...dynamics.rigid_body import momentum_regressor
@@ -136,7 +136,9 @@ class SlewRecord:
         if self.orbit is None or not self.has_attitude:
             return None
         r_B = np.einsum("nji,nj->ni", R, self.orbit.at(time_s))
-        return cumulative_trapezoid(R @ gravity_gradient_regressor(r_B, self.orbit.mu), time_s, axis=0, initial=0)
+        return scipy.integrate.cumulative_trapezoid(
+            R @ gravity_gradient_regressor(r_B, self.orbit.mu), time_s, axis=0, initial=0
+        )
 
     def tensor_columns(self, time_s: np.ndarray, R: np.ndarray, omega_B: np.ndarray) -> np.ndarray:
         """Momentum of the wheels per unit of each element of the tensor, body axes: what the body turns with less, and what the

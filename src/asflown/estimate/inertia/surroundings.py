@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
+import scipy
 
 from ...telemetry.attitude import together
 from ...telemetry.channels import AXES
@@ -47,7 +47,7 @@ class Surroundings:
         angle = orbit_angle(self.orbit.at(time_s))[:, None]
         every += [stream, np.cos(angle) * stream, np.sin(angle) * stream]
         columns = np.concatenate([levers(u) for u in every], axis=2)
-        return cumulative_trapezoid(R @ columns, time_s, axis=0, initial=0)
+        return scipy.integrate.cumulative_trapezoid(R @ columns, time_s, axis=0, initial=0)
 
 
 def orbit_angle(position_N: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from ...kit.doubts import Kind, Severity
 
@@ -47,8 +47,10 @@ class Swing:
         even = np.arange(time_s[0], time_s[-1] + step, step)
         alpha = np.stack([np.interp(even, time_s, a) for a in alpha_B.T], axis=1)
         W = self.frequency
-        system = signal.lti([1.0, 0.0], [1.0, 2 * self.damping * W, W**2])
-        total = sum(np.outer(signal.lsim(system, -alpha @ delta, even - even[0])[1], delta) for delta in self.coupling)
+        system = scipy.signal.lti([1.0, 0.0], [1.0, 2 * self.damping * W, W**2])
+        total = sum(
+            np.outer(scipy.signal.lsim(system, -alpha @ delta, even - even[0])[1], delta) for delta in self.coupling
+        )
         return np.stack([np.interp(time_s, even, h) for h in np.asarray(total).T], axis=1)
 
 

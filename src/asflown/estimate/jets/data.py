@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
+import scipy
 
 from ...dynamics.plume import FARTHEST_M, Jet, seen_from
 from ...kit.errors import BadInput
@@ -59,13 +59,15 @@ def by_momentum(met: DensityResult, sources: Sequence[Jet]) -> JetData:
     _check(t[used])
     t = t[used]
     nodes = np.arange(t[0], t[-1] + _STEP_S, _STEP_S)
-    integral = hats(t, nodes) @ np.apply_along_axis(cumulative_trapezoid, 0, np.eye(len(nodes)), dx=_STEP_S, initial=0)
+    integral = hats(t, nodes) @ np.apply_along_axis(
+        scipy.integrate.cumulative_trapezoid, 0, np.eye(len(nodes)), dx=_STEP_S, initial=0
+    )
     y, A = [], []
     for i, a in enumerate(met.axis):
         H = met.momentum.momentum_Nms[used, i]
         if met.gravity_gradient_Nm is not None:
             gravity = met.about(met.gravity_gradient_Nm)[:, i]
-            H = H - np.interp(t, met.time_s, cumulative_trapezoid(gravity, met.time_s, initial=0))
+            H = H - np.interp(t, met.time_s, scipy.integrate.cumulative_trapezoid(gravity, met.time_s, initial=0))
         column = integral * met.per_density(a, nodes)
         # several axes are weighted by their noise
         sigma = 1.0 if len(met.axis) == 1 else noise_sigma(t, H, degree=3, half_width=4 * float(np.median(np.diff(t))))

@@ -17,7 +17,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import fdtri
+import scipy
 
 from ...dynamics.flyby import Flyby, flyby_called
 from ...dynamics.plume import Jet, model_error, sources_passed
@@ -182,7 +182,7 @@ def _result(met: DensityResult, problem: JetRegression, fit: str) -> JetsResult:
     residual = _residual(problem, fitted)
     free = form.free(count)
     # the limit of a profile whose sigma is unknown too: Fisher's in place of chi-squared
-    limit = surface.least * (1 + fdtri(1, residual.worth - free, 0.95) / (residual.worth - free))
+    limit = surface.least * (1 + scipy.special.fdtri(1, residual.worth - free, 0.95) / (residual.worth - free))
     misfit = misfit_doubts(data, residual.left, free)
     found = tuple(replace(_source(surface, i, j, limit), explained=not misfit) for i, j in enumerate(fitted))
     scores = _scores(problem, columns, residual.worth)

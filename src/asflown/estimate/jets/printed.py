@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import minimize
+import scipy
 
 from ...dynamics.plume import Jet, model_error
 from .doubts import PRINTED_STARTS
@@ -51,7 +51,7 @@ def simplex(
     for _ in range(STARTS):
         start = np.r_[np.log(rng.uniform(0.05, 3, n)), np.log(rng.uniform(0.1, 1.0, 1 if form.common else n))]
         ends.append(
-            minimize(
+            scipy.optimize.minimize(
                 misfit,
                 start,
                 method="Nelder-Mead",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import nnls
+import scipy
 
 from ...craft.model import STALE_NS
 from ...kit.doubts import Doubt, Kind, Severity
@@ -139,7 +139,7 @@ def mixture(better: float, torque_Nm, precision, geometry: Geometry) -> list[str
     if better <= MISFIT:
         return []
     root = np.linalg.cholesky(precision).T
-    thrust, _ = nnls(root @ geometry.columns, root @ torque_Nm)
+    thrust, _ = scipy.optimize.nnls(root @ geometry.columns, root @ torque_Nm)
     return [n for n, f in zip(geometry.names, thrust, strict=True) if f > _PART * thrust.max()]
 
 

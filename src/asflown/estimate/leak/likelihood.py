@@ -17,8 +17,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import log_ndtr
+import scipy
 
 from ...kit.errors import BadInput
 from .residual import AXES_IN_A_LEAK, Steps
@@ -45,7 +44,7 @@ def threshold_for(rate_per_instant: float) -> float:
             remedy="Give a lower --false-alarms: it counts alarms an hour.",
         )
     wanted = np.log(rate_per_instant)
-    return float(brentq(lambda h: _EXPONENT * np.log(h) - h - wanted, 1.0, 200.0))
+    return float(scipy.optimize.brentq(lambda h: _EXPONENT * np.log(h) - h - wanted, 1.0, 200.0))
 
 
 def with_unknown_noise(log_ratio, degrees: float):
@@ -87,7 +86,7 @@ class Evidence:
         not quite known widens what is close and not the whole."""
         c = np.where(self.c > 0, self.c, 1.0)
         most = np.where(np.arange(self.c.shape[1]) < self.c.shape[1] // 2, thrust_N, 1.0)
-        size = 0.5 * np.log(2 * np.pi / c) - np.log(most) + log_ndtr(self.d / np.sqrt(c))
+        size = 0.5 * np.log(2 * np.pi / c) - np.log(most) + scipy.special.log_ndtr(self.d / np.sqrt(c))
         raw = self._raw
         log = np.where(self.c > 0, size - with_unknown_noise(raw.max() - raw, self.degrees), -np.inf)
         log = log + np.log(np.diff(self.onset, prepend=self.onset[0] - 1))[:, None]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import ndtri
+import scipy
 
 if TYPE_CHECKING:
     from .firing import Geometry
@@ -44,7 +44,7 @@ def threshold_at_rate(noise: Noise, rate_per_instant: float) -> float:
     """Residual momentum that the difference of two readings exceeds so often, about any axis. [N m s]
 
     Three axes at two sides, each taken to be as noisy as the worst: the rate is an upper bound."""
-    return float(np.sqrt(2) * noise.sigma.max() * -ndtri(rate_per_instant / 6))
+    return float(np.sqrt(2) * noise.sigma.max() * -scipy.special.ndtri(rate_per_instant / 6))
 
 
 def error_monitor(steps: Steps, geometry: Geometry, threshold_Nms: float, duration_s: float) -> ErrorMonitor:

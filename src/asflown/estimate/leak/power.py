@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import ndtri
+import scipy
 
 if TYPE_CHECKING:
     from .likelihood import Evidence, Monitor
@@ -24,7 +24,7 @@ def smallest_leaks(
     if len(evidence.onset) < 2:
         return {}
     raw = n / 2 * np.expm1(2 * monitor.threshold / n)
-    needed = np.sqrt(2 * raw) + ndtri(POWER)
+    needed = np.sqrt(2 * raw) + scipy.special.ndtri(POWER)
     age = (time_s[evidence.instant] - time_s[evidence.onset - 1])[::-1]
     c = evidence.c[::-1, : len(monitor.geometry.names)]
     return {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import chdtrc
+import scipy
 
 from ...kit.doubts import Doubt, Doubts
 from ...kit.errors import BadInput, check_choice
@@ -163,7 +163,7 @@ def _needed(white: Whitened, models: tuple[Model, ...], fitted: tuple[str, ...])
         return fitted, []
     free = int(white.arc.of("constant").sum())
     gain = bic[frozenset(without)] - bic[frozenset(fitted)] + free * np.log(white.kept.sum())
-    chance = float(chdtrc(free, gain))
+    chance = float(scipy.special.chdtrc(free, gain))
     if chance < _BY_CHANCE:
         return fitted, []
     names = white.arc.columns

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
+import scipy
 
 from ...dynamics.rigid_body import momentum_regressor
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
@@ -167,7 +167,7 @@ def with_harmonics(arc: Arc, drag: np.ndarray, *, modelled: bool) -> Arc:
     sizes = np.array(_HARMONICS) * (_MODELLED if modelled else 1.0)
     shares = [s * f(k * phase) for k, s in enumerate(sizes, 2) for f in (np.cos, np.sin)]
     torque = np.concatenate([drag * share[:, None, None] for share in shares], axis=2)
-    grown = cumulative_trapezoid(arc.turn @ torque, arc.time_s, axis=0, initial=0)
+    grown = scipy.integrate.cumulative_trapezoid(arc.turn @ torque, arc.time_s, axis=0, initial=0)
     columns = tuple(Column("", f"{DENSITY} {k}", "", 1.0) for k in range(torque.shape[2]))
     Z = np.concatenate([arc.Z, np.swapaxes(arc.turn, 1, 2) @ grown], axis=2)
     whole = np.concatenate([arc.torque, torque], axis=2)
@@ -221,7 +221,7 @@ def _course(subject: Subject) -> _Course:
         turn, bias, bias_sigma = _turn(subject, tai_ns, rates)
     momentum = (rates - bias) @ I_B + each.sum(axis=1)
     if pushed is not None:  # dh/dt = -u in inertial axes
-        given = cumulative_trapezoid(np.einsum("nij,nj->ni", R, pushed), t, axis=0, initial=0)
+        given = scipy.integrate.cumulative_trapezoid(np.einsum("nij,nj->ni", R, pushed), t, axis=0, initial=0)
         momentum = momentum - np.einsum("nji,nj->ni", R, given)
     return _Course(tai_ns, R, momentum, each, turn, bias_sigma, Doubts(doubts))
 
@@ -244,7 +244,7 @@ def _turn(subject: Subject, tai_ns: np.ndarray, rates: np.ndarray) -> tuple[np.n
 
 def _grown(course: _Course, torque: np.ndarray) -> np.ndarray:
     """Momentum that torques (N, 3, p) in body axes have brought, in body axes."""
-    grown = cumulative_trapezoid(course.R @ torque, course.seconds, axis=0, initial=0)
+    grown = scipy.integrate.cumulative_trapezoid(course.R @ torque, course.seconds, axis=0, initial=0)
     return np.swapaxes(course.R, 1, 2) @ grown
 
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import chdtrc
+import scipy
 
 if TYPE_CHECKING:
     from .whitened import Whitened
@@ -76,4 +76,4 @@ def _white(e: np.ndarray) -> float:
     if lags < 1 or power == 0:
         return 1.0
     r = np.array([float(e[:-k] @ e[k:]) / power for k in range(1, lags + 1)])
-    return float(chdtrc(lags, n * (n + 2) * np.sum(r**2 / (n - np.arange(1, lags + 1)))))
+    return float(scipy.special.chdtrc(lags, n * (n + 2) * np.sum(r**2 / (n - np.arange(1, lags + 1)))))

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import optimize
-from scipy.special import ndtr
+import scipy
 
 if TYPE_CHECKING:
     from .gather import Arc
@@ -58,8 +57,11 @@ class Posterior:
 
         def quantile(q):
             return float(
-                optimize.brentq(
-                    lambda x: float(self.weight @ ndtr((x - m) / s)) - q, low, high, xtol=1e-10 * (high - low)
+                scipy.optimize.brentq(
+                    lambda x: float(self.weight @ scipy.special.ndtr((x - m) / s)) - q,
+                    low,
+                    high,
+                    xtol=1e-10 * (high - low),
                 )
             )
 

@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import optimize
+import scipy
 
 from ...kit.regressed import Filtered, Steps, run, smooth
 
@@ -145,7 +145,7 @@ def _likeliest(arc: Arc, kept: np.ndarray, first: Levels) -> Levels:
     low = np.log([0.5, 0.5, 0.5, _LEAST * arc.size_Nm, max(_SHORTEST_S, 2 * arc.step_s)])
     high = np.log([100, 100, 100, 10 * arc.size_Nm, max(longest, 4 * arc.step_s)])
     start = np.clip(np.log([*first.white, first.slow_Nm, first.slow_s]), low, high)
-    found = optimize.minimize(
+    found = scipy.optimize.minimize(
         lambda x: _cost(arc, levels(x), kept), start, method="L-BFGS-B", bounds=list(zip(low, high, strict=True)),
         options={"maxiter": 25, "ftol": 1e-7, "eps": 1e-3},
     )  # fmt: skip

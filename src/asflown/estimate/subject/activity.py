@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from ...kit.errors import BadInput
 from ...kit.scatter import difference_sigma
@@ -24,7 +24,7 @@ _TURN = 1e-4
 
 def without_spikes(rates: np.ndarray) -> np.ndarray:
     """Rates (N,) or (N, k) through a running median of five samples."""
-    return ndimage.median_filter(rates, (5,) + (1,) * (rates.ndim - 1), mode="nearest")
+    return scipy.ndimage.median_filter(rates, (5,) + (1,) * (rates.ndim - 1), mode="nearest")
 
 
 def changes_as_in_a_slew(rates: np.ndarray, *, count_size: float = 0.0) -> bool:
@@ -32,7 +32,9 @@ def changes_as_in_a_slew(rates: np.ndarray, *, count_size: float = 0.0) -> bool:
     if len(rates) < 5:
         return False
     noise = max(np.nan_to_num(difference_sigma(rates, 3)), count_size / 12**0.5)
-    return bool(np.ptp(without_spikes(rates), axis=0).max() > max(_SWING, _SIGMAS * noise))
+    least = max(_SWING, _SIGMAS * noise)
+    # a median never changes by more than its samples do
+    return bool(np.ptp(rates, axis=0).max() > least and np.ptp(without_spikes(rates), axis=0).max() > least)
 
 
 def slews(telemetry: Telemetry) -> bool:

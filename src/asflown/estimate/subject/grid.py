@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 from ...kit.doubts import Doubt, Kind, Severity
 from ...kit.errors import BadInput, some_of
@@ -175,7 +175,7 @@ def splined(channel: Channel, grid: Grid) -> np.ndarray:
     for s in c.segments():
         inside = (at >= t[s][0] - 1e-9) & (at <= t[s][-1] + 1e-9)
         if s.stop - s.start >= 4 and inside.any():
-            out[inside] = CubicSpline(t[s], c.values[s])(at[inside])
+            out[inside] = scipy.interpolate.CubicSpline(t[s], c.values[s])(at[inside])
     return out
 
 

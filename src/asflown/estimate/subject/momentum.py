@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
+import scipy
 
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput
@@ -31,7 +31,7 @@ class Samples:
     each: np.ndarray
     body: np.ndarray
     rates: np.ndarray | None
-    attitude: Rotation | None
+    attitude: scipy.spatial.transform.Rotation | None
     doubts: Doubts
     splined_s: float = 0.0  # the coarsest cadence, where channels had to be splined to common instants
 
@@ -49,11 +49,15 @@ class Samples:
         return self.stored + self.body
 
     @property
-    def turned(self) -> Rotation:
+    def turned(self) -> scipy.spatial.transform.Rotation:
         """From body axes to those the body had at the first instant: by attitude, else by rates; no turn where neither is known."""
         if self.attitude is not None:
             return self.attitude[0].inv() * self.attitude
-        return Rotation.identity(len(self.tai_ns)) if self.rates is None else turned_by(self.seconds, self.rates)
+        return (
+            scipy.spatial.transform.Rotation.identity(len(self.tai_ns))
+            if self.rates is None
+            else turned_by(self.seconds, self.rates)
+        )
 
 
 #: Instants that a fit takes at least.
@@ -128,7 +132,7 @@ def _splined(channels: list[Channel], quaternion):
     if quaternion is not None and len(quaternion[0]) > 0.25 * grid.count:
         t = grid.of(quaternion[0])
         known &= (grid.seconds >= t[0]) & (grid.seconds <= t[-1])
-        attitude = Slerp(t, rotation(quaternion[1]))(grid.seconds[known])
+        attitude = scipy.spatial.transform.Slerp(t, rotation(quaternion[1]))(grid.seconds[known])
     tai_ns = grid.start_ns + np.rint(grid.seconds * NS).astype(np.int64)
     return tai_ns[known], values[known], attitude
 

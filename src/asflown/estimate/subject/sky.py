@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
+import scipy
 
 from ...dynamics.frames import earth_fixed, lvlh_axes
 from ...dynamics.orbit import BODIES, Orbit, flown
@@ -160,7 +160,7 @@ class _Vector:
 
     def other_attitudes(self) -> dict[str, np.ndarray]:
         """What would be measured if the quaternion meant another attitude, (N, 3)."""
-        q = quaternion(Rotation.from_matrix(self.R_NB))
+        q = quaternion(scipy.spatial.transform.Rotation.from_matrix(self.R_NB))
         made = {
             f"if the quaternion is taken as {words}": rotation(read(q)).inv().apply(self.true_N)
             for words, read in READINGS.items()
@@ -248,7 +248,7 @@ def _measured(telemetry: Telemetry, stem: str):
     if len(use) < _FEWEST:
         return None
     use = use[np.unique(np.linspace(0, len(use) - 1, _MOST).round().astype(int))]
-    R = Slerp((at_ns - at_ns[0]) / NS, rotation(q))((tai_ns[use] - at_ns[0]) / NS).as_matrix()
+    R = scipy.spatial.transform.Slerp((at_ns - at_ns[0]) / NS, rotation(q))((tai_ns[use] - at_ns[0]) / NS).as_matrix()
     return tai_ns[use], v[use], R
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import chdtri
+import scipy
 
 from ...telemetry.channels import AXES
 from ..firing import Parameter, Source
@@ -122,7 +122,7 @@ def fit_thrust(chains: list[Chain], names: tuple[str, ...], valve: Valve, priors
     weight /= weight.sum()
     values = weight @ np.array([v for v, _, _ in parts])
     spread = [c + np.outer(v - values, v - values) for v, c, _ in parts]
-    widened = max(chi / freedom, 1.0) if chi > chdtri(freedom, _CHANCE) else 1.0
+    widened = max(chi / freedom, 1.0) if chi > scipy.special.chdtri(freedom, _CHANCE) else 1.0
     inverse = np.einsum("u,uij->ij", weight, np.array([c for _, c, _ in parts]))
     shifts = {n: -sigma * (inverse @ considered[:, q]) for q, (n, sigma) in enumerate(model.considered.items())}
     covariance = widened * np.einsum("u,uij->ij", weight, spread)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
+import scipy
 
 from ...dynamics.pulses import moment_matrix
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
@@ -56,7 +56,7 @@ def balance(f: Firings) -> np.ndarray:
     """Left side of eq 15 at every instant but the first, (N - 1, 3). [N m s]"""
     H = f.momentum
     turning = np.cross(f.rates, H) if f.rates is not None else np.zeros_like(H)
-    return (H - H[0] + cumulative_trapezoid(turning, f.seconds, axis=0, initial=0))[1:]
+    return (H - H[0] + scipy.integrate.cumulative_trapezoid(turning, f.seconds, axis=0, initial=0))[1:]
 
 
 def printed_thrust(records: list[Firings], center_m) -> Printed:

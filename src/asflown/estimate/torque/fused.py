@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from ...kit.errors import BadInput, check_choice
-from ..fused import CONSIDERED, LOOPS, PRIORS, fused
 from .answer import Answer, Method
 
 if TYPE_CHECKING:
@@ -28,6 +27,8 @@ class Fused(Method):
     foreknown: Foreknown | None = None
 
     def __post_init__(self):
+        from ..fused import CONSIDERED, LOOPS, PRIORS  # nothing of it is loaded for another method
+
         check_choice(self.prior, (None, *PRIORS), "prior")
         check_choice(self.loop, (None, *LOOPS), "loop")
         for name, sigma in (self.considered or {}).items():
@@ -40,6 +41,8 @@ class Fused(Method):
 
     def estimate(self, subject: Subject, axes: tuple[int, ...]) -> Answer:
         """Raises CannotFuse where the record lacks what the method needs."""
+        from ..fused import fused
+
         f = fused(subject, axes, prior=self.prior, loop=self.loop, considered=self.considered, foreknown=self.foreknown)
         return Answer(
             by=self, grid=f.grid, torque_Nm=f.torque_Nm, sigma_Nm=f.sigma_Nm, momentum_Nms=f.momentum_Nms,

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...kit.doubts import Doubts
 from ...kit.errors import BadInput, some_of
 from ...kit.timeline import NS
-from ..environment import NAMES, environment_of
 from .result import KnownTorque
+from .rods import RODS_PULSE
 
 if TYPE_CHECKING:
     from ..environment import Air, Environment
@@ -29,6 +30,10 @@ _BELIEFS = {
 
 def check_known(names) -> tuple[str, ...]:
     """The names, each once, in the order of ``environment.NAMES``.  Raises BadInput for one that is no term."""
+    if not names:
+        return ()
+    from ..environment import NAMES  # the surroundings are loaded where one is asked for
+
     for name in names:
         if name not in NAMES:
             raise BadInput(f"{name!r} is no known torque", remedy=f"Give some of {some_of(NAMES)}.")
@@ -47,7 +52,9 @@ def foreknown(subject: Subject, names: tuple[str, ...], air: Air | None = None) 
 def with_known(result: TorqueResult, subject: Subject, names: tuple[str, ...], air: Air | None = None) -> TorqueResult:
     """The result of a fit that had some torques of the surroundings as an input, with these listed."""
     environment = _known(subject, _instants(result, subject), names, air)
-    return replace(result, known=_listed(environment), doubts=result.doubts + environment.doubts)
+    pulses = [d for d in result.doubts if d.kind is RODS_PULSE and "rods" in names]
+    left = Doubts(d for d in result.doubts if d not in pulses)
+    return replace(result, known=_listed(environment), doubts=left + environment.doubts)
 
 
 def without_known(
@@ -59,7 +66,10 @@ def without_known(
     environment = _known(subject, _instants(result, subject), names, air)
     total, errors = _sums(environment)
     changed = replace(
-        result, torque_Nm=result.torque_Nm - total, known=_listed(environment), doubts=result.doubts + environment.doubts
+        result,
+        torque_Nm=result.torque_Nm - total,
+        known=_listed(environment),
+        doubts=result.doubts + environment.doubts,
     )
     if result.torque_sigma_Nm is not None:
         sigma = np.sqrt(result.torque_sigma_Nm**2 + np.sum(errors**2, axis=2))
@@ -73,6 +83,8 @@ def _instants(result: TorqueResult, subject: Subject) -> np.ndarray:
 
 def _known(subject: Subject, tai_ns: np.ndarray, names: tuple[str, ...], air: Air | None) -> Environment:
     """Raises BadInput where one of them cannot be computed."""
+    from ..environment import environment_of
+
     environment = environment_of(subject, tai_ns, names, air)
     missing = [f"{name} needs {what}" for name, what in environment.left_out.items()]
     missing += [

@@ -20,10 +20,10 @@ import numpy as np
 from ...dynamics.momentum import wheel_momentum
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput, check_choice
+from ...kit.peaks import excursions
 from ...kit.regression import local_polynomial, loess
 from ...kit.timeline import NS, runs
 from ...telemetry.channels import AXES
-from ..fused import excursions
 from ..subject import (
     Grid,
     Subject,

@@ -7,18 +7,20 @@ there, is that for which the record is likeliest.  Thrust and fall time are solv
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from scipy.linalg import solve_triangular
+import scipy
 
 from ...kit.doubts import Doubts, Kind, Severity
 from ...kit.errors import BadInput
 from ...kit.timeline import NS
 from ...telemetry.channels import AXES
-from ..firing import Gained, gained
 from ..subject import Grid, Subject
 from .answer import Answer, Method
+
+if TYPE_CHECKING:
+    from ..firing import Gained
 
 _FEWEST, _LONGEST = 20, 2000  # steps, knots
 _DRAWS = 300
@@ -72,6 +74,8 @@ class OnTimes(Method):
             raise BadInput(
                 "no thruster fires in this record, so on-times tell nothing", file=source, remedy="Use --method fused."
             )
+        from ..firing import gained
+
         j = axes[0]
         g = gained(subject, AXES[j])
         if len(g.impulse_Nms) < _FEWEST:
@@ -132,11 +136,11 @@ def smoothed(g: Gained) -> Smoothed:
         """Of the record, its logarithm but for a constant."""
         factor = factored(variance)
         # the first two knots and every bend are independent: the determinant is the product of their variances
-        explained = np.sum(solve_triangular(factor, b, lower=True) ** 2) - np.sum(np.log(variance))
+        explained = np.sum(scipy.linalg.solve_triangular(factor, b, lower=True) ** 2) - np.sum(np.log(variance))
         return 0.5 * float(explained) - float(np.sum(np.log(np.diag(factor))))
 
     def posterior(variance):
-        root = solve_triangular(factored(variance), np.eye(len(N)), lower=True)
+        root = scipy.linalg.solve_triangular(factored(variance), np.eye(len(N)), lower=True)
         return root.T @ (root @ b), root
 
     variance = max((np.full(count - 2, (share * size) ** 2) for share in _BENDS), key=likelihood)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -122,14 +123,14 @@ def torque(
     names, subject = check_known(known), subject_of(telemetry, craft, moving)
     if not names:
         return torque_of(subject, method, axis)
-    if isinstance(method, Fused):
-        fed = replace(method, foreknown=foreknown(subject, names, air))
-        return with_known(torque_of(subject, fed, axis, pulsing="rods" not in names), subject, names, air)
-    return without_known(torque_of(subject, method, axis), subject, names, air)
+    if hasattr(method, "foreknown"):
+        method = replace(method, foreknown=foreknown(subject, names, air))
+    result = torque_of(subject, method, axis)
+    return (with_known if result.method == "fused" else without_known)(result, subject, names, air)
 
 
-def torque_of(subject: Subject, method: Method, axis: str = "all", *, pulsing: bool = True) -> TorqueResult:
-    """As ``torque``, of a subject that is already there; ``pulsing``: whether the torque rods' pulses are left to the method."""
+def torque_of(subject: Subject, method: Method, axis: str = "all") -> TorqueResult:
+    """As ``torque``, of a subject that is already there."""
     telemetry = subject.telemetry
     axes = (0, 1, 2) if axis == "all" else (AXES.index(axis),)
     try:
@@ -157,11 +158,11 @@ def torque_of(subject: Subject, method: Method, axis: str = "all", *, pulsing: b
         peak_scales=answer.peak_scales,
         evidence=answer.evidence,
         gained=answer.gained,
-        doubts=subject.doubts + answer.doubts + _doubts(subject, answer, relative=relative, pulsing=pulsing),
+        doubts=subject.doubts + answer.doubts + _doubts(subject, answer, relative=relative),
     )
 
 
-def _doubts(subject: Subject, answer: Answer, *, relative: bool, pulsing: bool) -> Doubts:
+def _doubts(subject: Subject, answer: Answer, *, relative: bool) -> Doubts:
     """Those of the record as a whole."""
     found: list[Doubt] = []
     if _nothing_changes(subject.telemetry):
@@ -170,8 +171,7 @@ def _doubts(subject: Subject, answer: Answer, *, relative: bool, pulsing: bool) 
         found.append(THRUSTERS_FIRE(thrusters=subject.firing))
     if relative:
         found.append(PER_SPIN_INERTIA(what="torque and momentum are"))
-    rods = rods_doubt(subject.telemetry, answer.sigma_Nm) if pulsing else None
-    return Doubts([*found, rods, *consistency(subject, answer)])
+    return Doubts([*found, rods_doubt(subject.telemetry, answer.sigma_Nm), *consistency(subject, answer)])
 
 
 def _nothing_changes(telemetry: Telemetry) -> bool:

@@ -11,15 +11,16 @@ import numpy as np
 from ...kit.digits import interval, plus_minus, scaled_unit
 from ...kit.ensemble import spread
 from ...kit.files import write_text
+from ...kit.peaks import PEAK_REACH_S, excursions, heights
 from ...kit.plain import plain
 from ...kit.result import Estimate, Series, per_spin_inertia
 from ...kit.schema import Annotated, Doc, Interval, NotRequired, Number, Numbers, Rows, TypedDict
 from ...kit.table import Table
 from ...telemetry.channels import AXES
-from ..fused import PEAK_REACH_S, AxisData, excursions, heights
 
 if TYPE_CHECKING:
     from ..firing import Gained
+    from ..fused import AxisData
 
 Column = Annotated[Numbers | Rows, Doc("one number an instant; for all axes three")]
 

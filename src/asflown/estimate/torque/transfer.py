@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
+import scipy
 
 from ...dynamics.loop import SecondOrder, filtered_rate, hankel_order_two, low_order
 from ...kit.doubts import Doubts, Kind, Severity
@@ -223,7 +223,7 @@ class _Inverse:
         nodes = np.arange(0, len(e), self.stride)
         if nodes[-1] != len(e) - 1:
             nodes = np.append(nodes, len(e) - 1)
-        curve = make_interp_spline(at[nodes], e[nodes], 5)
+        curve = scipy.interpolate.make_interp_spline(at[nodes], e[nodes], 5)
         e, rate, acceleration = curve(at), curve(at, 1), curve(at, 2)
         if self.rate_channel == "controller_rate_error":  # F(e') + KP e
             filtered, rate = told - k.kp_per_s * e, told - k.kp_per_s * e

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import chdtri
+import scipy
 
 from ...telemetry.channels import AXES
 from .doubts import MOTOR_AT_WORK, SLOWS_AS_DRIVEN, SLOWS_BY_COMMAND, SLOWS_WITH_OTHERS
@@ -91,7 +91,7 @@ def motor_off(record: RecordedWheels, name: str, start_s: float, stop_s: float, 
     of_all = scatter / np.sqrt(float(inside.sum()))
     if size > _LOUD * drag or mean > _IDLE * drag + _SURE * of_all:
         return False
-    if float(np.sum((means / errors) ** 2)) > chdtri(len(means), _CHANCE):
+    if float(np.sum((means / errors) ** 2)) > scipy.special.chdtri(len(means), _CHANCE):
         return None
     return True if mean < 0.5 * _IDLE * drag and size < _QUIET * drag else None
 

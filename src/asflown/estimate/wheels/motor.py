@@ -19,8 +19,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import cholesky_banded, solve_banded
-from scipy.optimize import minimize_scalar
+import scipy
 
 from ...kit.scatter import robust_sigma
 from .run_downs import STICTION_RATE
@@ -175,8 +174,8 @@ def _generalised(X, steps: Steps, kept):
         main = steps.dt / float(np.mean(steps.dt)) + 2 * abs(share)
         banded = np.zeros((2, len(main)))
         banded[0], banded[1] = np.where(kept, main, 1e8 * main), np.where(steps.joined, share, 0.0)
-        factor = cholesky_banded(banded, lower=True)
-        both = solve_banded((1, 0), factor, np.column_stack([X, steps.lost]))
+        factor = scipy.linalg.cholesky_banded(banded, lower=True)
+        both = scipy.linalg.solve_banded((1, 0), factor, np.column_stack([X, steps.lost]))
         A, y = both[:, :-1], both[:, -1]
         x, *_ = np.linalg.lstsq(A, y, rcond=None)
         errors = y - A @ x
@@ -185,7 +184,7 @@ def _generalised(X, steps: Steps, kept):
 
     tried = np.linspace(-0.99, 0.99, 23)
     best = float(tried[int(np.argmin([whitened(u)[0] for u in tried]))])
-    near = minimize_scalar(lambda u: whitened(u)[0], bounds=(max(best - 0.09, -0.999), min(best + 0.09, 0.999)), method="bounded")  # fmt: skip
+    near = scipy.optimize.minimize_scalar(lambda u: whitened(u)[0], bounds=(max(best - 0.09, -0.999), min(best + 0.09, 0.999)), method="bounded")  # fmt: skip
     return whitened(float(near.x))[1:]
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.special import fdtri
+import scipy
 
 from .doubts import FOLLOWS, MANY_COAST, ROUGH, SLOWS_AS_DRIVEN
 from .run_downs import CURRENT, FEWEST
@@ -150,4 +150,4 @@ def _rougher(one: tuple[float, int], other: tuple[float, int]) -> bool:
     (a, n), (b, m) = one, other
     if n < 3 or m < 3 or b <= 0:
         return False
-    return a / b > max(_ROUGHER, float(fdtri(n, m, 1 - _CHANCE)))
+    return a / b > max(_ROUGHER, float(scipy.special.fdtri(n, m, 1 - _CHANCE)))

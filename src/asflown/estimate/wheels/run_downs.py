@@ -17,8 +17,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.special import chdtri
+import scipy
 
 from ...kit.scatter import robust_sigma
 from ...kit.timeline import runs
@@ -172,7 +171,9 @@ def fit_coasts(spans: list[Span]) -> tuple[np.ndarray, np.ndarray, list[np.ndarr
     b = -2 * c2 / c1 if c1 else 0.0
     b = float(np.clip(b, -3 / longest, 3 / longest))
     start = np.array([-c1 - b * middles[0], b, *middles])
-    found = least_squares(residuals, start, jacobian, method="lm", x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    found = scipy.optimize.least_squares(
+        residuals, start, jacobian, method="lm", x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12
+    )
     # scaled, or the inverse of quantities of such different size is taken for singular
     size = np.linalg.norm(found.jac, axis=0)
     size[size == 0] = 1.0
@@ -268,7 +269,7 @@ class Finder:
         if far.sum() > max(1, 0.02 * len(r)) or far[:2].any() or far[-2:].any():
             return False
         total, freedom, largest = slow_misfit([p], [np.where(far, 0.0, r)], noise)
-        return largest < own_ways or total < chdtri(freedom, _CHANCE)
+        return largest < own_ways or total < scipy.special.chdtri(freedom, _CHANCE)
 
     def falls(self, a: int, b: int) -> bool:
         """Whether the wheel is slower in the second half by more than noise does."""
@@ -362,7 +363,7 @@ def _law(finder: Finder, spans: list[tuple[int, int]]) -> tuple[Law, list[np.nda
         keep = again
     total, freedom, _ = slow_misfit(used, residuals, sigma)
     # a chi square of this size is still chance, and widening for it would make the band too wide on average
-    widened = total / freedom if total > chdtri(freedom, 0.01) else 1.0
+    widened = total / freedom if total > scipy.special.chdtri(freedom, 0.01) else 1.0
     rate = float(np.mean(np.concatenate([p.u for p in used])))
     law = Law(x[:2], widened * sigma**2 * inverse[:2, :2], rate, widened)
     return law, keep, [coast(p.s, m, x[0], x[1]) for p, m in zip(parts, x[2:], strict=True)]

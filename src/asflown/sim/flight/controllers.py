@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.signal import cont2discrete
+import scipy
 
 from ...craft.model import CraftAt, tensor
 from ...kit.errors import BadInput
@@ -28,9 +28,9 @@ def rate_filter(natural_rad_s: float, damping: float, period_s: float, rule: str
     C, D = np.array([[1.0, 0.0]]), np.zeros((1, 1))
     if rule == "tustin":
         warped = 2 / natural_rad_s * np.tan(natural_rad_s * period_s / 2)
-        a, b, c, d, _ = cont2discrete((A, B, C, D), warped, "bilinear")
+        a, b, c, d, _ = scipy.signal.cont2discrete((A, B, C, D), warped, "bilinear")
     else:
-        a, b, c, d, _ = cont2discrete((A, B, C, D), period_s, "zoh")
+        a, b, c, d, _ = scipy.signal.cont2discrete((A, B, C, D), period_s, "zoh")
     return np.ascontiguousarray(a), np.ascontiguousarray(b[:, 0]), np.ascontiguousarray(c[0]), float(d[0, 0])
 
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
-from scipy.spatial.transform import Rotation
+import scipy
 
 from ...craft.model import CraftAt, check_inertia, tensor
 from ...kit.errors import BadInput
@@ -54,7 +53,7 @@ def moving_part(cover: CoverMotion, now: CraftAt) -> MovingPart:
     rest = now.inertia_kgm2 - own - mu * (r @ r * np.eye(3) - np.outer(r, r))
     check_inertia(rest, f"{now.craft.name} without its {mechanism.name}")
     axis = np.array(mechanism.hinge_axis) / np.linalg.norm(mechanism.hinge_axis)
-    arm = cover.arm * Rotation.from_rotvec(cover.arm_tilt * axis).apply([0.0, 0.0, 1.0])
+    arm = cover.arm * scipy.spatial.transform.Rotation.from_rotvec(cover.arm_tilt * axis).apply([0.0, 0.0, 1.0])
     travel = float(mechanism.deployed) - float(mechanism.stowed)
     times, quartics = _motion(cover, travel)
     return MovingPart(rest, axis, r - arm, arm, own, mu, times, quartics, mechanism.stowed, travel)
@@ -63,7 +62,9 @@ def moving_part(cover: CoverMotion, now: CraftAt) -> MovingPart:
 def _motion(cover: CoverMotion, travel: float) -> tuple[np.ndarray, np.ndarray]:
     """The angle as quartics between the table's times: the integral of a monotone cubic of the rate."""
     # at rest for a second before and after: the cubic then starts and ends without a jump in acceleration
-    rate = PchipInterpolator([cover.times[0] - 1, *cover.times, cover.times[-1] + 1], [0, *cover.rates, 0])
+    rate = scipy.interpolate.PchipInterpolator(
+        [cover.times[0] - 1, *cover.times, cover.times[-1] + 1], [0, *cover.rates, 0]
+    )
     turned = float(rate.integrate(cover.times[0], cover.times[-1]))
     if abs(turned / travel - 1) > 0.02:
         raise BadInput(
@@ -81,7 +82,7 @@ def _motion(cover: CoverMotion, travel: float) -> tuple[np.ndarray, np.ndarray]:
 def momentum_per_rate(part: MovingPart, angles) -> np.ndarray:
     """Momentum of the part, the body still, for one rad/s about its hinge: C k + mu r x r', (N, 3). [N m s per rad/s]"""
     k = part.hinge_axis
-    turned = Rotation.from_rotvec(np.outer(angles, k))
+    turned = scipy.spatial.transform.Rotation.from_rotvec(np.outer(angles, k))
     arm = turned.apply(part.arm)
     own = turned.apply(turned.apply(np.tile(k, (len(arm), 1)), inverse=True) @ part.part_inertia)
     return own + part.reduced_mass * np.cross(part.hinge + arm, np.cross(k, arm))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from ...dynamics.frames import earth_fixed
 from ...kit.errors import BadInput
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .world import Along
 
     #: Attitudes, body to inertial, at instants (M,).
-    Attitude = Callable[[np.ndarray], Rotation]
+    Attitude = Callable[[np.ndarray], scipy.spatial.transform.Rotation]
 
 #: Rates and accelerations are differences of attitudes this far apart: 1e-11 rad/s of truncation, 1e-13 rad/s2 of rounding. [s]
 _APART_S = 0.1
@@ -61,18 +61,18 @@ def _turning(old: Attitude, new: Attitude, p: Pointing) -> Attitude:
         x = np.clip((t - p.start) / p.turn, 0, 1)
         share = x**3 * (10 - 15 * x + 6 * x**2)
         begin = old(t)
-        return begin * Rotation.from_rotvec(share[:, None] * (begin.inv() * new(t)).as_rotvec())
+        return begin * scipy.spatial.transform.Rotation.from_rotvec(share[:, None] * (begin.inv() * new(t)).as_rotvec())
 
     return attitude
 
 
 def _held(p: Pointing, along: Along | None, before: Attitude | None) -> Attitude:
     """One pointing alone, as if it had always been commanded."""
-    turn = Rotation.from_rotvec(p.attitude or (0.0, 0.0, 0.0))
+    turn = scipy.spatial.transform.Rotation.from_rotvec(p.attitude or (0.0, 0.0, 0.0))
     if p.frame == "inertial":
         if p.attitude is None and before is not None:
             turn = before(np.array([p.start]))[0]
-        return lambda t: Rotation.from_quat(np.tile(turn.as_quat(), (len(t), 1)))
+        return lambda t: scipy.spatial.transform.Rotation.from_quat(np.tile(turn.as_quat(), (len(t), 1)))
     if along is None:
         raise BadInput("a pointing along the orbit needs an orbit", remedy="Give the scenario an [orbit].")
     if p.frame == "lvlh":
@@ -80,12 +80,12 @@ def _held(p: Pointing, along: Along | None, before: Attitude | None) -> Attitude
     return lambda t: _at_place(p, along, t) * turn
 
 
-def _along_track(along: Along, t) -> Rotation:
+def _along_track(along: Along, t) -> scipy.spatial.transform.Rotation:
     state = along.place(t)
     return lvlh_to_inertial(state[:, :3], state[:, 3:])
 
 
-def _at_place(p: Pointing, along: Along, t) -> Rotation:
+def _at_place(p: Pointing, along: Along, t) -> scipy.spatial.transform.Rotation:
     """z towards the place; y as near against the orbit normal as it can be."""
     state = along.place(t)
     to_earth = earth_fixed(along.epoch_tai_s + t)
@@ -94,7 +94,7 @@ def _at_place(p: Pointing, along: Along, t) -> Rotation:
     z /= np.linalg.norm(z, axis=1, keepdims=True)
     x = np.cross(-np.cross(state[:, :3], state[:, 3:]), z)
     x /= np.linalg.norm(x, axis=1, keepdims=True)
-    return Rotation.from_matrix(np.stack([x, np.cross(z, x), z], axis=2))
+    return scipy.spatial.transform.Rotation.from_matrix(np.stack([x, np.cross(z, x), z], axis=2))
 
 
 def _on_ellipsoid(p: Pointing) -> np.ndarray:

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NoReturn, cast
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 from ...dynamics.environment import MU_EARTH
 from ...dynamics.magnetic_field import field_at
@@ -51,16 +51,16 @@ class Along:
     mean_density_kgm3: float  # over the flight, the swing of day and night aside
 
     @cached_property
-    def place(self) -> CubicSpline:
+    def place(self) -> scipy.interpolate.CubicSpline:
         """Position and velocity at any instant: (M, 6)."""
-        return CubicSpline(self.time_s, np.hstack([self.position_N, self.velocity_N]))
+        return scipy.interpolate.CubicSpline(self.time_s, np.hstack([self.position_N, self.velocity_N]))
 
     @cached_property
     def curves(self) -> np.ndarray:
         """As the kernel takes them (plant.World)."""
         parts = [self.position_N, self.velocity_N, self.wind_N, self.field_N, self.sun_N]
         columns = np.column_stack([*parts, self.lit, self.density_kgm3])
-        c = CubicSpline(self.time_s, columns).c
+        c = scipy.interpolate.CubicSpline(self.time_s, columns).c
         # the penumbra has corners, about which a spline would swing
         c[:2, :, LIT] = 0.0
         c[2, :, LIT] = np.diff(self.lit) / self.step_s
@@ -222,7 +222,7 @@ def _path(scenario: Scenario, now: CraftAt, t: np.ndarray) -> tuple[np.ndarray, 
             file=scenario.folder / orbit.file,
             remedy="Give positions from before the settling until after the end.",
         )
-    curve = CubicSpline(times, places)
+    curve = scipy.interpolate.CubicSpline(times, places)
     return curve(t), curve(t, 1)
 
 

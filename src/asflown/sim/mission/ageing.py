@@ -17,11 +17,10 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.integrate import cumulative_simpson
-from scipy.interpolate import CubicSpline, PchipInterpolator
-from scipy.optimize import brentq
+import scipy
 
 from ...kit.errors import BadInput
+from ...kit.peaks import peaks
 from ..flight import MovingPart, momentum_per_rate, moving_part
 
 if TYPE_CHECKING:
@@ -69,9 +68,7 @@ def figures_of(time_s, torque_Nm, motor_on_s: float) -> Figures:
 
 def _two_largest(t, v) -> float:
     step = float(np.median(np.diff(t)))
-    from scipy.signal import find_peaks  # a second of import that only this needs
-
-    at, _ = find_peaks(v, height=0, prominence=STANDS_OUT * v.max(), distance=round(APART_S / step))
+    at = peaks(v, height=0, prominence=STANDS_OUT * v.max(), distance=round(APART_S / step))
     return float(np.mean(np.sort(v[at])[-2:])) if len(at) else 0.0
 
 
@@ -79,7 +76,7 @@ def _two_largest(t, v) -> float:
 class _Shape:
     """The pattern's momentum: its build-up, then turn after turn, down to rest."""
 
-    build_up: PchipInterpolator  # size of the momentum until the end of the build-up
+    build_up: scipy.interpolate.PchipInterpolator  # size of the momentum until the end of the build-up
     start: float
     end: float  # of the build-up
     turns: np.ndarray  # (m + 1,) times, the first that end
@@ -91,7 +88,7 @@ def _shape_of(cover: CoverMotion, part: MovingPart) -> _Shape:
     """Turns of the pattern, from its table's entries.  Raises BadInput where it does not build up, then swing."""
     times, rates = np.array(cover.times), np.array(cover.rates)
     end = cover.motor_on + BUILD_UP_S
-    angle = PchipInterpolator(times, rates).antiderivative()(times)
+    angle = scipy.interpolate.PchipInterpolator(times, rates).antiderivative()(times)
     if cover.direction == "stow":
         angle = part.travel - angle
     held = np.abs(rates * _per_rate(part)(angle))
@@ -106,7 +103,9 @@ def _shape_of(cover: CoverMotion, part: MovingPart) -> _Shape:
             remedy="Take cover-deploy or cover-stow as the pattern.",
         )
     stall = (cover.stall - times[turn[-2]]) / (times[turn[-1]] - times[turn[-2]])
-    from_rest = PchipInterpolator([times[0] - 1, *times], [0, *held])  # its slope is zero at the start
+    from_rest = scipy.interpolate.PchipInterpolator(
+        [times[0] - 1, *times], [0, *held]
+    )  # its slope is zero at the start
     return _Shape(from_rest, float(times[0]), end, times[turn], steps, float(np.clip(stall, 0, 1)))
 
 
@@ -167,10 +166,10 @@ def _reaction_about_hinge(part: MovingPart, time) -> np.ndarray:
     return -np.where(moving, g(angle, 1) * rate**2 + g(angle) * acceleration, 0.0)
 
 
-def _per_rate(part: MovingPart) -> CubicSpline:
+def _per_rate(part: MovingPart) -> scipy.interpolate.CubicSpline:
     """Momentum about the hinge per rate, over the angle from stowed."""
     angles = np.linspace(-0.01, part.travel + 0.01, 241)
-    return CubicSpline(angles, momentum_per_rate(part, angles) @ part.hinge_axis)
+    return scipy.interpolate.CubicSpline(angles, momentum_per_rate(part, angles) @ part.hinge_axis)
 
 
 def _motion(cover, part, per_rate, shape: _Shape, turns, steps, scale) -> CoverMotion:
@@ -200,7 +199,7 @@ def _motion(cover, part, per_rate, shape: _Shape, turns, steps, scale) -> CoverM
     most = 0.8 * min(1.0, rise_s / fall_s)
     if not over(most) < 0 < over(-most):
         raise _impossible("no length of its excursions gives the travel")
-    at, size = momentum(brentq(over, -most, most, xtol=1e-12))
+    at, size = momentum(scipy.optimize.brentq(over, -most, most, xtol=1e-12))
     if size[:-1].min() < 0.02 * size.max():
         raise _impossible("it would come to rest on its way")
     stall = round(float(at[-2] + shape.stall * (at[-1] - at[-2])), 3)
@@ -213,7 +212,7 @@ def _motion(cover, part, per_rate, shape: _Shape, turns, steps, scale) -> CoverM
     time = np.concatenate([first, late])
     swinging = size[j] + (size[j + 1] - size[j]) * 0.5 * (1 - np.cos(np.pi * x))
     held = np.concatenate([build_up * shape.build_up(first), swinging])
-    turned = cumulative_simpson(held, x=time, initial=0.0)
+    turned = scipy.integrate.cumulative_simpson(held, x=time, initial=0.0)
     turned *= area / turned[-1]
     angles = np.linspace(0, part.travel, 4001)
     angle = np.interp(turned if cover.direction == "deploy" else area - turned, swept(angles) - swept(0.0), angles)

@@ -23,6 +23,7 @@ import numpy as np
 from ...kit.doubts import Kind, Severity
 from ...kit.ensemble import spread
 from ...kit.errors import BadInput
+from ...kit.peaks import peaks
 from ...kit.plain import finite
 from ..entry import Value
 from .events import Event, stall
@@ -78,9 +79,7 @@ class Torque:
         if len(v) < 3 or not np.nanmax(v) > 0:
             return np.empty(0)
         step = float(np.median(np.diff(t)))
-        from scipy.signal import find_peaks  # a second of import that only this needs
-
-        at, _ = find_peaks(
+        at = peaks(
             np.nan_to_num(v), height=0, prominence=_STANDS_OUT * np.nanmax(v), distance=max(1, round(_APART_S / step))
         )
         return t[at[np.argsort(-v[at])]]

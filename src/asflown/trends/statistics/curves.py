@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+import scipy
 
 if TYPE_CHECKING:
     from ..entry import Curve
@@ -92,7 +92,7 @@ def shape_of(newest: Curve, past: list[Curve], day) -> Shape | None:
     ]))  # fmt: skip
     logs = np.log(own)
     z = (np.log(apart) - logs.mean()) / (logs.std(ddof=1) * np.sqrt(1 + 1 / len(own)))
-    return Shape(apart, float(np.median(own)), float(stats.t.sf(z, len(own) - 1)))
+    return Shape(apart, float(np.median(own)), float(scipy.stats.t.sf(z, len(own) - 1)))
 
 
 def family_band(curves: list[Curve], share: float = 0.95) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -100,7 +100,7 @@ def family_band(curves: list[Curve], share: float = 0.95) -> tuple[np.ndarray, n
     t = instants(curves)
     values = np.array([_at(c, t) for c in curves])
     n = len(values)
-    reach = stats.t.ppf(0.5 + share / 2, n - 1) * values.std(axis=0, ddof=1) * np.sqrt(1 + 1 / n)
+    reach = scipy.stats.t.ppf(0.5 + share / 2, n - 1) * values.std(axis=0, ddof=1) * np.sqrt(1 + 1 / n)
     return t, values.mean(axis=0) - reach, values.mean(axis=0) + reach
 
 

@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from ..entry import MOVES, Entry
 from .curves import TORQUE, distance
@@ -116,12 +116,14 @@ def equivalence(figure: str, pairs: list[Pair], trend: Trend, margin: float = MA
     scatter = float(np.sqrt(np.sum(left**2) / freedom))
     mean, n = float(np.mean(found)), len(found)
     error = scatter * np.sqrt(2 / n)
-    reach = float(stats.t.ppf(0.95, freedom)) * error
+    reach = float(scipy.stats.t.ppf(0.95, freedom)) * error
     edges = np.log1p(margin)
     if error == 0:
         p_value = 0.0 if abs(mean) < edges else 1.0
     else:
-        p_value = float(max(stats.t.sf((mean + edges) / error, freedom), stats.t.cdf((mean - edges) / error, freedom)))
+        p_value = float(
+            max(scipy.stats.t.sf((mean + edges) / error, freedom), scipy.stats.t.cdf((mean - edges) / error, freedom))
+        )
     low, high = 100 * np.expm1(mean - reach), 100 * np.expm1(mean + reach)
     return Equivalence(
         figure, 100 * float(np.expm1(mean)), (float(low), float(high)), 100 * margin, p_value,
@@ -143,5 +145,5 @@ def curve_distances(entries: list[Entry], pairs: list[Pair], kind: str = "deploy
         (ours if (a, b) in named else others).append(distance(one, other))
     if not ours:
         return None
-    p = float(stats.mannwhitneyu(ours, others, alternative="greater").pvalue) if len(others) >= 3 else None
+    p = float(scipy.stats.mannwhitneyu(ours, others, alternative="greater").pvalue) if len(others) >= 3 else None
     return Distances(tuple(ours), tuple(others), p)

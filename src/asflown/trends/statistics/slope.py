@@ -17,7 +17,7 @@ from itertools import permutations
 from math import factorial
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from ...kit.scatter import robust_sigma
 
@@ -88,7 +88,7 @@ class Trend:
             + np.median(self.values.sigma) ** 2
         )
         spread = np.sqrt(own**2 + 1 / w.sum() + (np.asarray(day) - mean) ** 2 / np.sum(w * (t - mean) ** 2))
-        reach = stats.t.ppf(0.5 + share / 2, len(t) - 2) * spread
+        reach = scipy.stats.t.ppf(0.5 + share / 2, len(t) - 2) * spread
         return self.at(day) - reach, self.at(day) + reach
 
     def crossing(self, limit: float, years: float = 20.0) -> tuple[float | None, float | None]:
@@ -194,7 +194,9 @@ def shuffles(count: int) -> np.ndarray:
 def detectable(residual: float, share) -> float:
     """Smallest change over the span that a test at 5 % detects with 80 % power, in the residual's unit."""
     freedom = len(share) - 2
-    return _error_of_rise(residual, share) * float(stats.t.ppf(0.975, freedom) + stats.t.ppf(POWER, freedom))
+    return _error_of_rise(residual, share) * float(
+        scipy.stats.t.ppf(0.975, freedom) + scipy.stats.t.ppf(POWER, freedom)
+    )
 
 
 def power_of_slope(change: float, residual: float, share) -> float:
@@ -202,11 +204,11 @@ def power_of_slope(change: float, residual: float, share) -> float:
     if residual == 0:
         return 1.0 if change else 0.05
     freedom = len(share) - 2
-    edge = stats.t.ppf(0.975, freedom)
+    edge = scipy.stats.t.ppf(0.975, freedom)
     away = change / _error_of_rise(residual, share)
     if away > 30:  # beyond the range of the distribution's numerics: power 1
         return 1.0
-    return float(stats.nct.sf(edge, freedom, away) + stats.nct.cdf(-edge, freedom, away))
+    return float(scipy.stats.nct.sf(edge, freedom, away) + scipy.stats.nct.cdf(-edge, freedom, away))
 
 
 def holm(p_values) -> np.ndarray:
