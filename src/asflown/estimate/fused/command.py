@@ -339,10 +339,13 @@ def _beside(of_axis: list[Series], fed: np.ndarray, at: np.ndarray, gain: float,
 
     Bearing drag, a bias of the rate sensor, an inertia on board that is another: all shift the attitude held, and would be
     taken for a disturbance.  ``fed``: integral of the feed-forward; ``gain``: inertia x KD."""
-    return _smoothed(*_left_beside(of_axis, fed, at, gain, law), 1, *_smoothing(law, at))
+    seconds, left = _left_beside(of_axis, fed, at, gain, law)
+    return _smoothed(seconds, left, 1, *_smoothing(law, at))
 
 
-def _left_beside(of_axis: list[Series], fed: np.ndarray, at: np.ndarray, gain: float, law: WheelController):
+def _left_beside(
+    of_axis: list[Series], fed: np.ndarray, at: np.ndarray, gain: float, law: WheelController
+) -> tuple[np.ndarray, np.ndarray]:
     """Instants, and the integral of what the actuators do beside the law and its feed-forward; as ``_beside``."""
     row = {s.row: s for s in of_axis}
     h, e = row[MOMENTUM], row[ATTITUDE_ERROR]

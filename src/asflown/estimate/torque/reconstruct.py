@@ -124,7 +124,7 @@ def torque(
     if not names:
         return torque_of(subject, method, axis)
     if hasattr(method, "foreknown"):
-        method = replace(method, foreknown=foreknown(subject, names, air))
+        method = replace(method, foreknown=foreknown(subject, names, air))  # type: ignore[call-arg]
     result = torque_of(subject, method, axis)
     return (with_known if result.method == "fused" else without_known)(result, subject, names, air)
 
