@@ -106,7 +106,10 @@ class Body:
             Q[driven_state, driven_state] = drive * size_Nm**2
         A, fixed = discretize(F, Q, times.steps_s)
         driven, scale = np.empty((0, *A.shape)), np.empty((len(times.seconds), 0))
-        for state, by, size in ((driven_state, drive, None if one else size_Nm), (self.torque, 1 / self.inertia_kgm2**2, steps_Nm)):
+        for state, by, size in (
+            (driven_state, drive, None if one else size_Nm),
+            (self.torque, 1 / self.inertia_kgm2**2, steps_Nm),
+        ):
             if size is not None:
                 D = np.zeros_like(Q)
                 D[state, state] = by
@@ -203,6 +206,14 @@ class AxisData:
         lines = body.lines(self.levels, self.times)
         out = respond(lines, self.model, self.data, body.torque, body.slope, columns)
         return out[:, 0] if torque.ndim == 1 else out
+
+    def moved(self, torque_Nm: np.ndarray) -> np.ndarray:
+        """States (N, n), at the instants of the pass, of a craft at rest driven by a torque (N,) [N m]."""
+        body, model, (N, n) = self.body, self.model, (len(self.times.seconds), self.body.states)
+        read = Measurements(n * np.arange(N + 1), np.tile(np.arange(n), N), np.zeros(n * N))
+        seen = replace(model, H=np.eye(n))
+        column = np.asarray(torque_Nm, float)[:, None] / body.inertia_kgm2
+        return respond(body.lines(self.levels, self.times), seen, read, body.torque, body.slope, column).reshape(N, n)
 
     def without(self, torque_Nm: np.ndarray) -> AxisData:
         """The same less what a known torque (N,), at the instants of the pass, does."""

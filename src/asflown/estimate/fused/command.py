@@ -68,7 +68,9 @@ class Command:
     fed_Nms: np.ndarray  # its integral
     variance: np.ndarray
     beside_Nm: np.ndarray
-    lag_rad: np.ndarray  # (M, 3), by which the attitude that the loop holds without a torque is behind the one commanded
+    lag_rad: (
+        np.ndarray
+    )  # (M, 3), by which the attitude that the loop holds without a torque is behind the one commanded
     source: str
     gyroscopic: bool
     acceleration_fed: bool
@@ -215,10 +217,15 @@ def hold_of(subject: Subject, grid: Grid, series: dict[int, list[Series]]) -> Co
         slopes = np.diff(left[ends]) / np.diff(s[ends])
         error = float(np.std(slopes, ddof=1)) / np.sqrt(_PARTS)
         if abs(np.mean(slopes)) > _SURE * error:
-            lag[:, j], sigma[j] = -_smoothed(s, left, 1, *_smoothing(law, at)).at(at, 1) / _stiffness(law, J, j), _WIDE * error
+            lag[:, j], sigma[j] = (
+                -_smoothed(s, left, 1, *_smoothing(law, at)).at(at, 1) / _stiffness(law, J, j),
+                _WIDE * error,
+            )
     if not sigma.any():
         return None
-    return Command(at, none, none, none, none, np.zeros((2, 3)), sigma, lag, HOLD, gyroscopic=False, acceleration_fed=False)
+    return Command(
+        at, none, none, none, none, np.zeros((2, 3)), sigma, lag, HOLD, gyroscopic=False, acceleration_fed=False
+    )
 
 
 def _stiffness(law: WheelController, J: np.ndarray, j: int) -> float:
@@ -332,10 +339,13 @@ def _beside(of_axis: list[Series], fed: np.ndarray, at: np.ndarray, gain: float,
 
     Bearing drag, a bias of the rate sensor, an inertia on board that is another: all shift the attitude held, and would be
     taken for a disturbance.  ``fed``: integral of the feed-forward; ``gain``: inertia x KD."""
-    return _smoothed(*_left_beside(of_axis, fed, at, gain, law), 1, *_smoothing(law, at))
+    seconds, left = _left_beside(of_axis, fed, at, gain, law)
+    return _smoothed(seconds, left, 1, *_smoothing(law, at))
 
 
-def _left_beside(of_axis: list[Series], fed: np.ndarray, at: np.ndarray, gain: float, law: WheelController):
+def _left_beside(
+    of_axis: list[Series], fed: np.ndarray, at: np.ndarray, gain: float, law: WheelController
+) -> tuple[np.ndarray, np.ndarray]:
     """Instants, and the integral of what the actuators do beside the law and its feed-forward; as ``_beside``."""
     row = {s.row: s for s in of_axis}
     h, e = row[MOMENTUM], row[ATTITUDE_ERROR]

@@ -62,6 +62,8 @@ _PROPOSALS, _LEAST_PROPOSALS, _BURN_IN = 50, 30_000, 0.4
 _CHAINS = 4
 #: In a long record chains that lie further apart than this walk again, with so many times the proposals.
 _FAR, _FURTHER = 1.05, 6
+#: In an event, where few draws are kept and chance alone makes 1.05.
+_FAR_IN_EVENT = 1.1
 #: Chains have met below this R-hat; the furthest that widens a band.
 _MET, _FURTHEST = 1.01, 5.0
 #: Draws of a chain for each that is used, to see whether chains have met; at how many instants that is looked at.
@@ -250,7 +252,7 @@ def draw_torques(axis: AxisData, count: int, rng: Generator) -> Posterior:
         return _in_long(axis, wanted, count, rng)
     search = _Search.of_bends(axis, wanted, rng)
     ways, found = _ways(search, count)
-    walked = _walked(search, ways, _PRIOR, found, count)
+    walked = _walked(search, ways, _PRIOR, found, count, apart=_FAR_IN_EVENT)
     drawn = walked.drawn
     torque = search.torques(ways, axis.data.value, drawn)
     mean, as_lines, scale = torque.mean(axis=0), float(np.mean(drawn.which == 0)), 1.0

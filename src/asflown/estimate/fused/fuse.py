@@ -41,6 +41,7 @@ from .turning import COMMAND_SMOOTHED, CommandNotKnown, check_turn
 
 if TYPE_CHECKING:
     from .command import Command
+    from .feed import Feed, Foreknown
 
 PRIORS = ("edges", "matern", "wiener")
 
@@ -136,17 +137,19 @@ class _Coupling:
     """What a model of one axis leaves out, on the grid, (M, 3): w x H and the products of inertia's torque.
 
     ``variance``: of w x H, by the rates' uncertainty; that of H does not matter.  ``unsure_Nm``: (M, 3, K), by what it is off for one
-    sigma of each element of the inertia.  ``beside_Nm``: (3,), one sigma of what the actuators do beside the law."""
+    sigma of each element of the inertia.  ``beside_Nm``: (3,), one sigma of what the actuators do beside the law;
+    ``feed``: torques known beforehand."""
 
     torque_Nm: np.ndarray
     variance: np.ndarray
     momentum_Nms: np.ndarray
     unsure_Nm: np.ndarray
     beside_Nm: np.ndarray
+    feed: Feed | None
 
     @classmethod
     def of(
-        cls, motion: _Motion, I_B: np.ndarray, share: float, command: Command | None = None, *, whole: bool
+        cls, motion: _Motion, I_B: np.ndarray, share: float, command: Command | None, feed: Feed | None, *, whole: bool
     ) -> _Coupling:
         """``share``: one sigma of the inertia; ``whole``: all axes' motion is known; else no torque is taken off."""
         H = motion.rate @ I_B + motion.stored_Nms
@@ -160,19 +163,23 @@ class _Coupling:
             variance = variance + command.variance[1] * np.diag(I_B) ** 2
             torque += command.acceleration * np.diag(I_B) - command.feed_Nm
             beside = command.beside_Nm
-        return cls(torque, variance, H, unsure, beside)
+        return cls(torque, variance, H, unsure, beside, feed)
 
     def known(self, grid: Grid, j: int) -> Known | None:
         """The torque about an axis that has to be taken off first; None for none."""
-        column = self.torque_Nm[:, j]
-        return (lambda t: -np.interp(t, grid.seconds, column)) if np.any(column) else None
+        column, feed = self.torque_Nm[:, j], self.feed
+        if feed is None:
+            return (lambda t: -np.interp(t, grid.seconds, column)) if np.any(column) else None
+        return lambda t: feed.known(j)(t) - np.interp(t, grid.seconds, column)
 
     def considered(self, grid: Grid, j: int, axis: AxisData) -> np.ndarray:
         """What one sigma of each thing that the coupling takes as known does to an axis's measurements, (M, K)."""
         left, size, _ = np.linalg.svd(self.unsure_Nm[:, j], full_matrices=False)  # a hold's are all alike: one will do
         counts = size > _COUNTS * size.max(initial=0.0)
         torques = (left * size)[:, counts].T
-        moved = [axis.response(np.interp(axis.times.seconds, grid.seconds, c)) for c in torques]
+        torques = [np.interp(axis.times.seconds, grid.seconds, c) for c in torques]
+        torques += [] if self.feed is None else self.feed.unsure(j, axis.times.seconds)
+        moved = [axis.response(c) for c in torques]
         if self.beside_Nm[j] > 0 and isinstance(axis.body, HeldBody):
             moved.append(np.where(axis.channel == ATTITUDE_ERROR, self.beside_Nm[j] / axis.body.stiffness_Nm, 0.0))
         return np.column_stack(moved) if moved else axis.columns
@@ -201,25 +208,27 @@ def fused(
     loop: str | None = None,
     considered: dict[str, float] | None = None,
     seed: int = _SEED,
+    foreknown: Foreknown | None = None,
 ) -> Fusion:
     """The torque about some axes.
 
     ``prior``: one of PRIORS, or None: edges.  ``loop``: one of
     ``gather.LOOPS``, or None: modelled where that is possible and explains the data no worse than measured.
-    ``considered``: sigmas in place of some of CONSIDERED.
+    ``considered``: sigmas in place of some of CONSIDERED.  ``foreknown``: torques known beforehand, an input of the fit: the torque
+    found is the rest.
 
     Raises CannotFuse where body rates, actuators or inertia are missing and what ``gather`` raises."""
     with needed():
         subject.known_inertia()
     sizes = CONSIDERED | {"inertia": subject.inertia_share} | (considered or {})
     try:
-        found = _fused(subject, gather(subject, axes, loop), axes, prior, sizes, seed)
+        found = _fused(subject, gather(subject, axes, loop, foreknown=foreknown), axes, prior, sizes, seed)
     except CommandNotKnown as why:
-        found = _fused(subject, gather(subject, axes, loop, follow=True), axes, prior, sizes, seed)
+        found = _fused(subject, gather(subject, axes, loop, follow=True, foreknown=foreknown), axes, prior, sizes, seed)
         found = replace(found, doubts=Doubts([COMMAND_SMOOTHED(**why.told), *found.doubts]))
     if loop is not None or found.loop == "measured" or not found.unexplained:
         return found
-    other = _fused(subject, gather(subject, axes, "measured"), axes, prior, sizes, seed)
+    other = _fused(subject, gather(subject, axes, "measured", foreknown=foreknown), axes, prior, sizes, seed)
     if len(other.unexplained) >= len(found.unexplained):
         return found
     first = found.unexplained[0]
@@ -235,11 +244,12 @@ def _fused(
     whole, still = len(bodies) == 3, record.still
     if still:  # a turn that counts is seen before the levels are fitted, and need not be fitted twice
         _check_turn(record, _motion(bodies, {j: unfitted(bodies[j], record.series[j]) for j in bodies}, record), I_B)
-    fits = {j: fit_levels(bodies[j], record.series[j]) for j in bodies}
+    feed = record.feed
+    fits = {j: fit_levels(bodies[j], record.series[j], None if feed is None else feed.known(j)) for j in bodies}
     motion = _motion(bodies, fits, record)
     if still:
         _check_turn(record, motion, I_B)
-    coupling = _Coupling.of(motion, I_B, considered["inertia"], record.command, whole=whole)
+    coupling = _Coupling.of(motion, I_B, considered["inertia"], record.command, feed, whole=whole)
     if whole and not record.together:
         fits = _carried(subject, axes, record, motion, fits)
     seeds = np.random.default_rng(seed).spawn(3)
@@ -299,8 +309,10 @@ def _motion(bodies: dict[int, Body], fits: dict[int, AxisFit], record: Record) -
     sigma = np.full(3, np.inf)
     for j, body in bodies.items():
         axis = AxisData.of(body, fits[j].levels, fits[j].series, record.grid.seconds)
+        known = None if record.feed is None else record.feed.known(j)
+        axis = axis.without_known(known)
         best, wanted = smooth(freed(axis) if is_slow(axis) else axis.model, axis.data), axis.times.wanted
-        x = best.mean[wanted]
+        x = (best.mean if known is None else best.mean + axis.moved(known(axis.times.seconds)))[wanted]
         F, _ = body.dynamics(axis.levels)
         F[body.torque, body.slope] = 1
         rate[:, j], acceleration[:, j] = x[:, body.RATE], x @ F[body.RATE]
@@ -333,7 +345,9 @@ def _carried(subject: Subject, axes, record: Record, motion: _Motion, fits: dict
 
     again = {
         j: series[-1]
-        for j, series in gather(subject, axes, record.loop, stored, follow=record.loop == "modelled" and not record.still).series.items()
+        for j, series in gather(
+            subject, axes, record.loop, stored, follow=record.loop == "modelled" and not record.still
+        ).series.items()
     }
     return {
         j: replace(f, series=tuple(again[j] if s.row == again[j].row else s for s in f.series)) for j, f in fits.items()

@@ -15,10 +15,12 @@ from ...kit.timeline import NS
 from ...telemetry.channels import AXES
 from ..subject import GAPS_BRIDGED, Grid, Subject, actuators, gap_doubts, gaps_on_grid, grid_for, splined
 from .command import Command, command_of, errors_from_quaternions, has_attitudes, has_command, hold_of
+from .feed import Feed
 from .series import ATTITUDE_ERROR, BODY_RATE, CONTROL_TORQUE, MOMENTUM, Series
 
 if TYPE_CHECKING:
     from ...telemetry.telemetry import Channel, Telemetry
+    from .feed import Foreknown
 
 LOOPS = ("modelled", "measured")
 
@@ -60,7 +62,7 @@ class Record:
     ``loop``: whether the controller is modelled, or the actuators' action only measured; ``pushed``: they are
     known by their torque, not their momentum; ``start_Nms``: their momentum (3,), taken off the series;
     ``together``: whether all actuators are read at the same instants; ``command``: the motion taken off the series of a
-    modelled loop, where the craft is commanded to move or its actuators do something beside the law."""
+    modelled loop, where the craft is commanded to move or its actuators do something beside the law; ``feed``: torques known beforehand."""
 
     grid: Grid
     loop: str
@@ -70,6 +72,7 @@ class Record:
     together: bool
     doubts: Doubts
     command: Command | None = None
+    feed: Feed | None = None
 
     @property
     def still(self) -> bool:
@@ -84,12 +87,13 @@ def gather(
     stored_Nms: Stored | None = None,
     *,
     follow: bool = False,
+    foreknown: Foreknown | None = None,
 ) -> Record:
     """All axes where their channels are there, else those asked for.
 
     ``loop``: one of LOOPS, or None: modelled where that is possible.  ``stored_Nms``: the actuators' momentum as known so
     far, which carries the samples of wheels read at different instants to common ones.  ``follow``: the craft is commanded
-    to turn, also where the telemetry does not say so.
+    to turn, also where the telemetry does not say so.  ``foreknown``: torques known beforehand.
 
     Raises CannotFuse where a channel is missing, silent or short, BadInput for a loop that cannot be modelled."""
     tlm = subject.telemetry
@@ -130,7 +134,8 @@ def gather(
     carried = None if momentum.together or stored_Nms is not None else WHEELS_CARRIED()
     told = () if command is None else command.doubts
     doubts = Doubts([*found, not_modelled, carried, *told, *gap_doubts(tlm, grid, silent, GAPS_BRIDGED)])
-    return Record(grid, loop, bool(pushed), series, momentum.start, momentum.together, doubts, command)
+    feed = None if foreknown is None else Feed.of(foreknown, grid)
+    return Record(grid, loop, bool(pushed), series, momentum.start, momentum.together, doubts, command, feed)
 
 
 def _actuators(subject: Subject):

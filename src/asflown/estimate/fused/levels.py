@@ -105,7 +105,11 @@ def _without_outliers(body: Body, levels: Levels, series, known: Known | None, l
         if left_out > most:
             return series
         if not len(worst):
-            return [_with_stretches(before, after) for before, after in zip(series, kept, strict=True)] if left_out else series
+            return (
+                [_with_stretches(before, after) for before, after in zip(series, kept, strict=True)]
+                if left_out
+                else series
+            )
         kept = _without(kept, axis, worst)
 
 

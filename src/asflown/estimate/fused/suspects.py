@@ -31,6 +31,8 @@ _APART_S = 150.0
 #: Edges are looked for under a torque this many times smaller than was fitted with them in it; so many are taken at once, if they
 #: are worth their price: the logarithm of one in ten minutes at a place known to its reach.
 _SMOOTHER, _AT_ONCE, _EDGE_COSTS = 4.0, 4, 3.4
+#: By this log likelihood ratio a torque of continuous curvature, whose band is narrower, has to be the better one.
+_CLEARLY = 3.0
 #: Most suspects in an hour, the surest first.
 _MOST_AN_HOUR = 15
 
@@ -53,7 +55,7 @@ def suspects(axis: AxisData) -> Suspects:
     rough, curved = axis, replace(axis, body=replace(axis.body, curved=not axis.body.wiener))
     found = _suspects(curved)
     levels, cost = _between(rough, axis.levels, found.edges)
-    if cost < _cost(curved, found.axis.levels, found.edges):
+    if cost < _cost(curved, found.axis.levels, found.edges) + _CLEARLY:
         return replace(found, axis=replace(rough, levels=levels))
     return found
 

@@ -16,6 +16,7 @@ from .polynomial import Polynomial
 from .transfer import Transfer
 
 if TYPE_CHECKING:
+    from ..fused import Foreknown
     from ..subject import Subject
 
 #: Methods by name.
@@ -42,12 +43,13 @@ class Automatic(Method):
     """Fused where it can be; else momentum, or transfer where attitude error alone is telemetered, with a doubt."""
 
     name: ClassVar[str] = "automatic"
+    foreknown: Foreknown | None = None
 
     def estimate(self, subject: Subject, axes: tuple[int, ...]) -> Answer:
         from ..fused import CannotFuse
 
         try:
-            return Fused().estimate(subject, axes)
+            return Fused(foreknown=self.foreknown).estimate(subject, axes)
         except CannotFuse as why:
             found = f"{why.channel}: {why.what}" if why.channel else why.what
         method = Transfer() if _attitude_alone(subject) else Momentum()

@@ -9,6 +9,7 @@ from ...kit.errors import BadInput, check_choice
 from .answer import Answer, Method
 
 if TYPE_CHECKING:
+    from ..fused import Foreknown
     from ..subject import Subject
 
 
@@ -17,12 +18,13 @@ class Fused(Method):
     """One smoothing of the loop with a torque in it.
 
     ``prior``: edges, matern or wiener; ``loop``: modelled or measured; ``considered``: one sigma of quantities taken as known,
-    by name; see ``estimate.fused.fused`` for what None means."""
+    by name; see ``estimate.fused.fused`` for what None means.  ``foreknown``: torques known beforehand, by instants."""
 
     name: ClassVar[str] = "fused"
     prior: str | None = None
     loop: str | None = None
     considered: dict[str, float] | None = None
+    foreknown: Foreknown | None = None
 
     def __post_init__(self):
         from ..fused import CONSIDERED, LOOPS, PRIORS  # nothing of it is loaded for another method
@@ -41,7 +43,7 @@ class Fused(Method):
         """Raises CannotFuse where the record lacks what the method needs."""
         from ..fused import fused
 
-        f = fused(subject, axes, prior=self.prior, loop=self.loop, considered=self.considered)
+        f = fused(subject, axes, prior=self.prior, loop=self.loop, considered=self.considered, foreknown=self.foreknown)
         return Answer(
             by=self, grid=f.grid, torque_Nm=f.torque_Nm, sigma_Nm=f.sigma_Nm, momentum_Nms=f.momentum_Nms,
             settings=f.settings, doubts=f.doubts, paths_Nm=f.paths_Nm, peak_scales=f.peak_scales, evidence=f.evidence,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +15,7 @@ from ..redundancy import redundancy
 from ..subject import PER_SPIN_INERTIA, Subject, subject_of
 from .answer import Answer, Method
 from .choice import method_called
-from .known import check_known, without_known
+from .known import check_known, foreknown, with_known, without_known
 from .result import TorqueResult
 from .rods import rods_doubt
 
@@ -89,7 +90,7 @@ def torque(
         Mechanism whose inertia is taken off; 'auto': the one whose angle is seen to move; None: no mechanism moves.
     known : sequence of str
         Torques of the surroundings that are taken off: 'gravity-gradient', 'sunlight', 'dipole', 'drag', 'rods', as the craft file has
-        them; their uncertainty goes into the band.
+        them; their uncertainty goes into the band.  The fused method has them as an input of its fit, pulses of torque rods too.
     air : Air, optional
         F10.7 of the day before, its 81-day mean and Ap for the density of the drag; without it the density falls exponentially.
 
@@ -120,8 +121,12 @@ def torque(
     elif variant != "corrected" or any(v is not None for v in options.values()):
         raise BadInput("a method object has its own options", remedy="Give them to the object: Momentum(window_s=20).")
     names, subject = check_known(known), subject_of(telemetry, craft, moving)
+    if not names:
+        return torque_of(subject, method, axis)
+    if hasattr(method, "foreknown"):
+        method = replace(method, foreknown=foreknown(subject, names, air))  # type: ignore[call-arg]
     result = torque_of(subject, method, axis)
-    return without_known(result, subject, names, air) if names else result
+    return (with_known if result.method == "fused" else without_known)(result, subject, names, air)
 
 
 def torque_of(subject: Subject, method: Method, axis: str = "all") -> TorqueResult:

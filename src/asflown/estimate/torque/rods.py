@@ -23,7 +23,7 @@ RODS_PULSE = Kind(
     "torque.rods-pulse", Severity.SUSPECT,
     "the torque rods switch faster than the torque is resolved: {size_Nm:.2g} N m (rms) of what they exert is averaged out, and the band "
     "does not contain it",
-    "Read the torque as a mean over the rods' period; asflown sources takes the rods out before it fits.",
+    "Add --with rods: the fused method then has their pulses as a known torque.",
 )  # fmt: skip
 
 
