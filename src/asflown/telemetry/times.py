@@ -113,7 +113,8 @@ def _exact_of_numbers(values: np.ndarray, scale: Scale) -> np.ndarray | None:
     factor = UNITS_NS[scale.unit]
     for decimals in (0, 3, 6, DECIMALS[scale.unit]):
         power = 10**decimals
-        whole = np.rint(values.astype(float) * power)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused below, by its row
+            whole = np.rint(values.astype(float) * power)
         # a decimal of 15 digits and its double are one to one; integers beyond are left to the decimals
         if power > factor * 100 or not (np.abs(whole) < 9e14).all() or not (whole / power == values).all():
             continue
