@@ -63,6 +63,7 @@ def test_control_characters_are_shown_and_formulas_are_text(tmp_path):
     as_written(ax)  # twice does no harm
 
 
+@pytest.mark.slow
 def test_an_id_of_a_store_may_hold_a_formula(tmp_path):
     from asflown.maneuvers.history import past_model
     from asflown.maneuvers.write import maneuver_text
@@ -89,18 +90,22 @@ def started(words, cwd, **how) -> subprocess.CompletedProcess:
     return subprocess.run([*PROGRAM, *words], cwd=cwd, check=False, text=True, env=environment, **quiet)
 
 
+@pytest.mark.slow
 def test_streams_that_fail_end_in_a_sentence(tmp_path):
     with open("/dev/full", "w") as full:
         done = started(["telemetry", "names"], tmp_path, stdout=full)
         assert done.returncode == 2 and done.stderr.startswith("error: standard output cannot be written")
     closed = f"{sys.executable} -c 'from asflown.cli.start import main; main()' telemetry names"
     for words, code in ((f"{closed} >&-", 0), (f"{closed} 2>&- >/dev/null", 0), (f"{closed} | head -1", 0)):
-        done = subprocess.run(["bash", "-o", "pipefail", "-c", words], cwd=tmp_path, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            ["bash", "-o", "pipefail", "-c", words], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
         assert done.returncode == code and "Traceback" not in done.stderr and done.stderr == "", (words, done)
     done = started(["craft", "show", "cassini"], tmp_path, env={"PYTHONIOENCODING": "ascii"})
     assert done.returncode == 0 and done.stderr == ""
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_the_program_quietly(tmp_path):
     for wait_s in (0.15, 1.5):
         program = subprocess.Popen([*PROGRAM, "simulate", "cassini-mission", "--out", "m"], cwd=tmp_path,
@@ -109,7 +114,7 @@ def test_ctrl_c_ends_the_program_quietly(tmp_path):
         program.send_signal(signal.SIGINT)
         _, err = program.communicate(timeout=60)
         # within the first tenths Python itself is still starting, and answers in its own way
-        assert program.returncode == 130 and "Traceback" not in err or wait_s < 1
+        assert wait_s < 1 or (program.returncode == 130 and "Traceback" not in err)
     assert not any(p.is_file() for p in tmp_path.rglob("*"))
 
 
@@ -209,9 +214,12 @@ def test_every_verb_takes_strict_and_accept():
     for command in verbs(get_command(app)):
         names = {p.name for p in command.params}
         assert {"strict", "accept"} <= names, command.name
-        assert ("force" in names) == bool(names & {"out", "table", "plot", "plot_dir", "report", "folder"}), command.name
+        assert ("force" in names) == bool(names & {"out", "table", "plot", "plot_dir", "report", "folder"}), (
+            command.name
+        )
 
 
+@pytest.mark.slow
 def test_nearly_every_kind_is_found_without_importing_it():
     from asflown.cli.verb import known_kinds
     from asflown.kit.doubts import kinds

@@ -55,6 +55,7 @@ def test_a_result_is_replaced_by_one_of_its_kind_only(suffix, data):
     check_output(place, "result TorqueResult")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".svg", ".png", ".pdf"])
 def test_a_picture_is_known_again(suffix, data):
     place = data.with_name(f"o{suffix}")
@@ -136,7 +137,9 @@ def test_a_report_replaces_no_model_and_no_store(tmp_path):
     rcs.write_text(maneuver_text(execute(past_model("rcs/2012-1").model, RCS_SET, 1)))
     model.write_text(run("gates", rcs, "--json").out)
     before = model.read_bytes()
-    assert "fit.json" in complaint("gates", rcs, "--report", tmp_path / "fit.html")  # its twin would take the model's place
+    assert "fit.json" in complaint(
+        "gates", rcs, "--report", tmp_path / "fit.html"
+    )  # its twin would take the model's place
     assert "fit.json" in complaint("gates", "watch", rcs, "--against", model, "--plot-dir", model)
     assert model.read_bytes() == before and not (tmp_path / "fit.html").exists()
     store = tmp_path / "st.db"
