@@ -180,7 +180,7 @@ class Job:
         wrote, read = [], [i.file for i in result.inputs]
         with together():
             if out is not None:
-                self.may_write(out, result.kind, read)
+                self.may_write(out, result.file_kind, read)
                 result.save(out)
                 wrote.append(out)
             if plot is not None:

@@ -33,7 +33,7 @@ from . import (
     tune,
     wheels,
 )
-from .output import Shown, say
+from .output import NobodyReads, Shown, say
 
 app = typer.Typer(help=__doc__, add_completion=False, rich_markup_mode=None)
 app.command("torque", short_help="Reconstruct the disturbance torque.")(torque.torque)
@@ -100,7 +100,7 @@ def _run() -> object:
         code = _complain(str(why), told=why.record())
     except (typer.Abort, KeyboardInterrupt):
         code = 130
-    except BrokenPipeError:  # whoever read it has enough
+    except NobodyReads:  # whoever read it has enough
         _silence_output()
         code = 0
     except MemoryError:
@@ -132,7 +132,8 @@ def _open_streams() -> None:
 
 def _silence_output() -> None:
     """What is still to be written on standard output is thrown away, so that the interpreter's end does not try again."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    with suppress(OSError, ValueError):  # a stream that is no file
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _verb(usage) -> str:

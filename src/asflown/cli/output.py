@@ -33,6 +33,10 @@ def say(text: str = "") -> None:
         print(encodable(visible(text), sys.stderr.encoding), file=sys.stderr, flush=True)
 
 
+class NobodyReads(Exception):
+    """Whoever read standard output has gone: `asflown … | head`.  No OSError, which the parser would answer with exit code 1."""
+
+
 class Shown:
     """Standard output on which nothing from outside commands the terminal, and which its encoding cannot stop."""
 
@@ -40,8 +44,17 @@ class Shown:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        self._stream.write(encodable(visible(text), self._stream.encoding))
+        try:
+            self._stream.write(encodable(visible(text), self._stream.encoding))
+        except BrokenPipeError:
+            raise NobodyReads from None
         return len(text)
+
+    def flush(self) -> None:
+        try:
+            self._stream.flush()
+        except BrokenPipeError:
+            raise NobodyReads from None
 
     def __getattr__(self, name):
         return getattr(self._stream, name)

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import functools
 import inspect
+import pkgutil
 import re
 from difflib import get_close_matches
-from importlib import resources
+from importlib import import_module, resources
 from typing import TYPE_CHECKING
 
 import typer
@@ -89,8 +90,17 @@ def verb(function):
     return call
 
 
-def known_kinds() -> list[str]:
-    """Ids of every kind of doubt, from where they are declared: to import all of asflown would take seconds."""
+def known_kinds(*, imported: bool = False) -> list[str]:
+    """Ids of the kinds of doubt: those whose ids are written where they are declared, without importing them, which takes seconds.
+
+    ``imported``: all, as every module declares them."""
+    if imported:
+        from ..kit.doubts import kinds
+
+        for module in pkgutil.walk_packages([str(resources.files("asflown"))], "asflown."):
+            if ".migrations" not in module.name and not module.name.endswith(("__main__", "prewarm")):
+                import_module(module.name)
+        return list(kinds())
     found: set[str] = set()
     folders = [resources.files("asflown")]
     while folders:
@@ -106,6 +116,8 @@ def known_kinds_of(asked: Iterable[str] | None) -> tuple[str, ...]:
     """The kinds that --accept names.  Raises BadInput for one that does not exist."""
     kinds = tuple(dict.fromkeys(asked or ()))
     known = known_kinds() if kinds else []
+    if not set(kinds) <= set(known):
+        known = known_kinds(imported=True)
     for kind in kinds:
         if kind not in known:
             near = get_close_matches(kind, known, 3, 0.5)

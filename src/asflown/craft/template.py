@@ -109,7 +109,9 @@ def outline_of(file: str | Path) -> Outline:
         told = json.loads(source)
     except (ValueError, RecursionError) as why:
         raise BadInput(f"this JSON does not describe a craft ({str(why)[:100]})", file=file, remedy=_JSON) from None
-    craft = validated(_Told, told if isinstance(told, dict) else {}, file, _JSON)
+    if not isinstance(told, dict):
+        raise BadInput("this JSON does not describe a craft", file=file, remedy=_JSON)
+    craft = validated(_Told, told, file, _JSON)
     wheels = [(w.name, np.array(w.axis, float), w.spin_inertia_kg_m2) for w in craft.wheels]
     lengths = [float(np.linalg.norm(a)) for _, a, _ in wheels]
     spins = tuple(s for _, _, s in wheels)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from .escapes import on_one_line
+
 
 class BadInput(ValueError):
     """Input that cannot be used.  The command line turns it into one message and exit code 2.
@@ -34,6 +36,7 @@ class BadInput(ValueError):
         if time is not None:
             place += f", at {time}" if place else f"at {time}"
         head = f"{place}: {what}" if place else what
+        head, remedy = on_one_line(head), on_one_line(remedy)  # much of it was written by others
         room = self.LONGEST - len(remedy) - 2
         if len(head) > room:
             head = head[: room - 1] + "…"

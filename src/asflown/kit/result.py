@@ -109,7 +109,7 @@ class Estimate:
     # ---- derived ----
 
     @property
-    def kind(self) -> str:
+    def file_kind(self) -> str:
         """What a saved result calls itself, so that another kind of file is not replaced by it."""
         return f"result {type(self).__name__}"
 
@@ -180,7 +180,7 @@ class Estimate:
         Raises BadInput for another suffix, for a file that cannot be written, and for a table of a result without a series."""
         kind = Path(path).suffix.lower()
         if kind == ".json":
-            whole = {"file": mark(self.kind)} | self.record() | {"provenance": self.provenance}
+            whole = {"file": mark(self.file_kind)} | self.record() | {"provenance": self.provenance}
             write_text(path, json.dumps(plain(whole), allow_nan=False, indent=1) + "\n")
         elif kind in (".csv", ".parquet"):
             if self.series() is None:
@@ -230,7 +230,7 @@ class Estimate:
             *(f"DOUBT ({d.severity.label}) {d}" for d in self.doubts),
             *(f"input {i.file} sha256 {i.sha256}" for i in self.inputs),
             f"asflown {version('asflown')}, options {plain(self.options)}",
-            mark(self.kind),
+            mark(self.file_kind),
         ]
         return [f"# {on_one_line(r)}" for r in remarks]
 
@@ -244,7 +244,7 @@ class Estimate:
             with duckdb.connect() as link:
                 link.register("frame", frame)
                 target = str(place).replace("'", "''")
-                told = f"{{asflown: '{kept}', file: '{mark(self.kind)}'}}"
+                told = f"{{asflown: '{kept}', file: '{mark(self.file_kind)}'}}"
                 try:
                     link.execute(f"COPY frame TO '{target}' (FORMAT parquet, KV_METADATA {told})")
                 except duckdb.Error as why:

@@ -57,13 +57,13 @@ def as_written(drawn) -> None:
     Ticks keep the formulas of their own numbers."""
     from matplotlib.axis import Axis
     from matplotlib.text import Text
-    from matplotlib.ticker import FixedFormatter
+    from matplotlib.ticker import FuncFormatter
 
     numbers: set[int] = set()
     for axis in drawn.findobj(Axis):
         words = axis.get_major_formatter()
-        if isinstance(words, FixedFormatter):
-            words.seq = [visible(str(w)) for w in words.seq]
+        if isinstance(words, FuncFormatter):  # ticks that were given words
+            words.func = lambda x, at, told=words.func: visible(told(x, at))
         else:
             numbers |= {id(t) for t in axis.findobj(Text) if t is not axis.label}
     for text in drawn.findobj(Text):

@@ -17,7 +17,7 @@ from ..kit.timeline import utc_to_posix_ns
 from .channels import member_names
 from .tables import Table, checked, quiet_database, quoted_pattern, said, share_done, typed
 from .text import form_of_rows
-from .times import exact_ns, scale_called
+from .times import NotATime, exact_ns, scale_called
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -261,7 +261,17 @@ def _cf_time(clock, epoch) -> tuple[str, str | None, np.ndarray | None]:
         raise BadInput(f"the time coordinate {clock.name!r} is not numeric", remedy="Store times as numbers with CF units.")  # fmt: skip
     if calendar == "utc":
         return f"time [{scale.unit}]", start.strip(), None
-    return f"time [unix {scale.unit}]", start.strip(), exact_ns(values, scale) + utc_to_posix_ns(start.strip())
+    try:
+        ns = exact_ns(values, scale)
+    except NotATime as why:
+        raise BadInput(
+            f"value {why.row + 1} of the time coordinate {clock.name!r} is not a time ({values[why.row]})",
+            remedy="Store times as finite numbers with CF units.",
+        ) from None
+    origin_ns = utc_to_posix_ns(start.strip())
+    if len(ns) and not abs(int(ns[np.argmax(np.abs(ns))]) + origin_ns) < 2**63 - 1:
+        raise BadInput("the times are outside the calendar", remedy="Check the units of the time coordinate.")
+    return f"time [unix {scale.unit}]", start.strip(), ns + origin_ns
 
 
 # ---- FITS, CDF, MATLAB, Excel -----------------------------------------------------------------------

@@ -114,9 +114,10 @@ def exact_of_numbers(values: np.ndarray, scale: Scale) -> np.ndarray | None:
     for decimals in range(DECIMALS[scale.unit] + 1):
         power = 10**decimals
         few = values[:1000].astype(float)
-        if not (np.rint(few * power) / power == few).all():
-            continue
-        whole = np.rint(values.astype(float) * power)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused below, by its row
+            if not (np.rint(few * power) / power == few).all():
+                continue
+            whole = np.rint(values.astype(float) * power)
         # a decimal of 15 digits and its double are one to one; integers beyond are left to the decimals
         largest = max(float(np.max(whole, initial=0)), -float(np.min(whole, initial=0)))
         if power > factor * 100 or not largest < 9e14 or not (whole / power == values).all():

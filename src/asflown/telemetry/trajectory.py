@@ -23,6 +23,8 @@ from .tables import Table, numbers_of, times_of
 from .text import read_csv
 
 _FEWEST = 4
+#: No position or velocity in any unit is beyond it, and its square does not overflow.
+_LARGEST = 1e60
 _UNITS = {"position": "m", "velocity": "m/s"}
 #: Largest relative difference of the velocities from the slope of the positions; beyond it frame or unit is wrong.
 _UNLIKE = 0.05
@@ -88,6 +90,14 @@ def _column(table: Table, name: str, unit: str) -> np.ndarray:
             rows, values, nan = numbers_of(table, j, name)
             if len(rows) < len(table) or len(nan):
                 raise BadInput("a cell is blank", channel=name, remedy="Every row gives position and velocity.")
+            big = np.flatnonzero(np.abs(values) > _LARGEST)
+            if len(big):
+                raise BadInput(
+                    "the value is too large for a trajectory",
+                    line=table.line(int(rows[big[0]])),
+                    channel=name,
+                    remedy="Check its unit and exponent.",
+                )
             return values * si_factor(split[1], unit)
     raise BadInput(
         "the trajectory has no such column",

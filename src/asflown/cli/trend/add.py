@@ -6,6 +6,7 @@ from pathlib import Path
 
 import typer
 
+from ...kit.escapes import visible
 from ..options import CHANNELS, CM, CRAFT, INERTIA, JSON, craft_from, hashes
 from ..output import print_json, provenance, wrapped
 from ..verb import verb, weighed
@@ -95,7 +96,7 @@ def analysed(events, ship, channels=None, figures=None, jobs: int = 0):
     work = partial(_one, ship=ship, channels=channels, figures=figures)
     jobs = min(jobs or os.cpu_count() or 1, max(1, sum(e.file is not None for e in events) // 2))
     with Progress(
-        TextColumn("{task.description:36s}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=Console(stderr=True)
+        TextColumn("{task.description:36s}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=Console(stderr=True)
     ) as bar:  # fmt: skip
         task = bar.add_task("analysing", total=len(events))
         entries = []
@@ -103,14 +104,21 @@ def analysed(events, ship, channels=None, figures=None, jobs: int = 0):
         def take(found):
             for e in found:
                 entries.append(e)
-                bar.update(task, advance=1, description=f"analysed {e.event}")
+                bar.update(task, advance=1, description=visible(f"analysed {e.event}"))
 
         if jobs <= 1:
             take(map(work, events))
         else:
-            with ProcessPoolExecutor(jobs) as pool:
+            with ProcessPoolExecutor(jobs, initializer=_leave_ctrl_c) as pool:
                 take(pool.map(work, events))
     return entries
+
+
+def _leave_ctrl_c() -> None:
+    """Ctrl-C reaches every process of a terminal: the one that started the others answers for all."""
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _one(event, ship, channels, figures):

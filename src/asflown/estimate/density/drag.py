@@ -16,7 +16,7 @@ from ...dynamics.drag import PRINTED_E3, torque_per_density
 from ...kit.doubts import Doubt, Doubts, Kind, Severity
 from ...kit.errors import BadInput, check_choice
 from ...kit.quantities import si_factor
-from ...kit.reading import csv_rows, plain_number, read_text
+from ...kit.reading import csv_rows, plain_number, read_text, reading
 from ...telemetry.channels import AXES, split_header
 from .expected import size_doubts
 
@@ -201,7 +201,8 @@ def _from_table(air: Aerodynamics, flyby: Flyby, given: DragGiven) -> DragAlong:
     path, axis = Path(str(given.table)), given.axis
     if given.area_m2 is not None or given.arm_m is not None:
         raise BadInput("area and arm are given, and the drag table holds them too", remedy="Leave out --area, --arm.")
-    column = _read(path)
+    with reading(path, _REMEDY, "this drag table"):
+        column = _read(path)
     t, area = column["time"], column["area"]
     speed = column["speed"] if "speed" in column else flyby.speed(t)
     arm = np.stack([column.get(f"arm_{a}", np.zeros(len(t))) for a in AXES], axis=1)

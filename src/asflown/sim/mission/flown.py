@@ -68,6 +68,8 @@ class MissionRecord(TypedDict):
     doubts_detail: list[DoubtRecord]
     as_written: dict
     versions: dict[str, str]
+    file: Annotated[str, Doc("what the file calls itself")]
+    files: Annotated[dict[str, str], Doc("SHA-256 of the other files, by their names within the folder")]
 
 
 def fly_mission(
@@ -151,13 +153,12 @@ def _flown(mission: Mission, craft: Craft, planned, folder: Path, progress: Call
         doubts += flight.doubts
         progress(f"{number:3d} of {len(planned)}  {p.event.name}: impulse {true.impulse_Nms:+.3f} N m s, "
                  f"excursions {1e3 * true.peak_positive_Nm:+.1f} and {1e3 * true.peak_negative_Nm:+.1f} mN m")  # fmt: skip
-    record = _mission_record(mission, craft, records, doubts)
     texts["events.toml"] = _event_list(mission, planned)
-    told = {"file": mark(MISSION)} | record | {"files": digests(texts)}
+    record = _mission_record(mission, craft, records, doubts, texts)
     with together():
         for name, text in texts.items():
             write_text(folder / name, text)
-        write_text(folder / "mission.json", json.dumps(told, indent=1, allow_nan=False) + "\n")
+        write_text(folder / "mission.json", json.dumps(record, indent=1, allow_nan=False) + "\n")
     return record
 
 
@@ -307,7 +308,7 @@ def _event_record(p: Planned, flight, true: Figures) -> dict:
     }
 
 
-def _mission_record(mission: Mission, craft: Craft, records, doubts) -> MissionRecord:
+def _mission_record(mission: Mission, craft: Craft, records, doubts, texts: dict[str, str]) -> MissionRecord:
     law = mission.ageing
     said = Doubts(d for d, _ in grouped(doubts))  # the same of many events once
     start = {
@@ -347,6 +348,8 @@ def _mission_record(mission: Mission, craft: Craft, records, doubts) -> MissionR
         "as_written": mission.as_written,
         "versions": {"python": platform.python_version()}
         | {p: version(p) for p in ("asflown", "numpy", "scipy", "numba")},
+        "file": mark(MISSION),
+        "files": digests(texts),
     }
 
 
