@@ -209,6 +209,22 @@ def _forward(A, entries, b, driven, drives, kind, scale, start, H, given, R, fir
 
 
 @jit
+def _of_changes(k, r, S, A, entries, kind, afterwards, dA, turns, dQ, grows, by_change):
+    """Adds what one step tells of a change of A and Q, but for the part of the smoothed mean.
+
+    Of what is new at this step, w, and of the state before it, x: cov w x^T = -Q S A P, and E w = Q r."""
+    for d in range(len(grows)):
+        t, i, c = grows[d, 0], grows[d, 1], grows[d, 2]
+        by_change[t] += 0.5 * dQ[t, kind[k], i, c] * (r[i] * r[c] - S[i, c])
+    for d in range(len(turns)):
+        t, i, c = turns[d, 0], turns[d, 1], turns[d, 2]
+        total = 0.0
+        for f in range(len(entries)):
+            total += S[i, entries[f, 0]] * A[k, entries[f, 0], entries[f, 1]] * afterwards[k - 1, entries[f, 1], c]
+        by_change[t] -= dA[t, kind[k], i, c] * total
+
+
+@jit
 def _backward(
     A, entries, driven, drives, kind, scale, start, H, R, e, variance, product, mean, covariances, afterwards, dA, turns, dQ, grows,
 ):  # fmt: skip
@@ -260,18 +276,7 @@ def _backward(
             for d in range(len(drives)):
                 j, i, c = drives[d, 0], drives[d, 1], drives[d, 2]
                 by_drive[k, j] += 0.5 * scale[k, j] * driven[j, kind[k], i, c] * (r[i] * r[c] - S[i, c])
-            # of what is new at this step w, and of the state before it x: cov w x^T = -Q S A P, and E w = Q r
-            for d in range(len(grows)):
-                t, i, c = grows[d, 0], grows[d, 1], grows[d, 2]
-                by_change[t] += 0.5 * dQ[t, kind[k], i, c] * (r[i] * r[c] - S[i, c])
-            for d in range(len(turns)):
-                t, i, c = turns[d, 0], turns[d, 1], turns[d, 2]
-                total = 0.0
-                for f in range(len(entries)):
-                    total += (
-                        S[i, entries[f, 0]] * A[k, entries[f, 0], entries[f, 1]] * afterwards[k - 1, entries[f, 1], c]
-                    )
-                by_change[t] -= dA[t, kind[k], i, c] * total
+            _of_changes(k, r, S, A, entries, kind, afterwards, dA, turns, dQ, grows, by_change)
             adjoint[k] = r
             before[:] = 0.0
             for d in range(len(entries)):

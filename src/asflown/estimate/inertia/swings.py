@@ -77,7 +77,9 @@ def answer(time_s: np.ndarray, alpha_B: np.ndarray, frequency: float, damping: f
     step = _STEP * 2 * np.pi / frequency
     even = np.arange(time_s[0], time_s[-1] + step, step)
     alpha = np.stack([np.interp(even, time_s, a) for a in alpha_B.T], axis=1)
-    b, a, _ = scipy.signal.cont2discrete(([-1.0, 0.0], [1.0, 2 * damping * frequency, frequency**2]), step, method="foh")
+    b, a, _ = scipy.signal.cont2discrete(
+        ([-1.0, 0.0], [1.0, 2 * damping * frequency, frequency**2]), step, method="foh"
+    )
     rate = scipy.signal.lfilter(np.atleast_1d(np.squeeze(b)), a, alpha, axis=0)
     return np.stack([np.interp(time_s, even, r) for r in rate.T], axis=1)
 

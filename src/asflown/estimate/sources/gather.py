@@ -191,7 +191,7 @@ def with_field_bias(arc: Arc, dipole: np.ndarray) -> Arc:
     A bias b is no field: it makes a torque dipole x b in the model that is not there, constant in body axes."""
     K = len(arc.time_s)
     torque = np.broadcast_to(_FIELD_BIAS_T * np.cross(dipole, np.eye(3)).T, (K, 3, 3))
-    grown = cumulative_trapezoid(arc.turn @ torque, arc.time_s, axis=0, initial=0)
+    grown = scipy.integrate.cumulative_trapezoid(arc.turn @ torque, arc.time_s, axis=0, initial=0)
     columns = tuple(Column("", f"{FIELD_BIAS} {a}", "T", _FIELD_BIAS_T) for a in AXES)
     Z = np.concatenate([arc.Z, np.swapaxes(arc.turn, 1, 2) @ grown], axis=2)
     return replace(arc, Z=Z, columns=(*arc.columns, *columns), torque=np.concatenate([arc.torque, torque], axis=2))
