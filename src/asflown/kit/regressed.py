@@ -147,6 +147,14 @@ def _turned(A, entries, P, half, out):
 
 
 @jit
+def _evened(P):
+    """Takes off what rounding made unlike on both sides of the diagonal."""
+    for i in range(len(P)):
+        for c in range(i):
+            P[i, c] = P[c, i] = 0.5 * (P[i, c] + P[c, i])
+
+
+@jit
 def _forward(A, entries, b, driven, drives, kind, scale, start, H, given, R, first):
     N, n = len(kind), A.shape[1]
     M, columns = given.shape
@@ -201,9 +209,7 @@ def _forward(A, entries, b, driven, drives, kind, scale, start, H, given, R, fir
                 gain = product[m, i] * R[m] / s - left[i]
                 for c in range(n):
                     P[i, c] += gain * product[m, c] / s
-            for i in range(n):
-                for c in range(i):
-                    P[i, c] = P[c, i] = 0.5 * (P[i, c] + P[c, i])
+            _evened(P)
         afterwards[k] = P
     return innovation, variance, product, mean, covariances, afterwards
 
@@ -222,6 +228,15 @@ def _of_changes(k, r, S, A, entries, kind, afterwards, dA, turns, dQ, grows, by_
         for f in range(len(entries)):
             total += S[i, entries[f, 0]] * A[k, entries[f, 0], entries[f, 1]] * afterwards[k - 1, entries[f, 1], c]
         by_change[t] -= dA[t, kind[k], i, c] * total
+
+
+@jit
+def _through_means(dA, turns, kind, adjoint, smoothed, by_change):
+    """The part that ``_of_changes`` leaves: of a change of A, through the smoothed mean."""
+    for k in range(1, len(kind)):
+        for d in range(len(turns)):
+            t, i, c = turns[d, 0], turns[d, 1], turns[d, 2]
+            by_change[t] += dA[t, kind[k], i, c] * adjoint[k, i] * smoothed[k - 1, c]
 
 
 @jit
@@ -268,9 +283,7 @@ def _backward(
                 gained = H[m, i] / s - Sg[i]
                 for c in range(n):
                     S[i, c] += gained * H[m, c]
-            for i in range(n):
-                for c in range(i):
-                    S[i, c] = S[c, i] = 0.5 * (S[i, c] + S[c, i])
+            _evened(S)
         smoothed[k] = mean[k] + covariances[k] @ r
         if k > 0:
             for d in range(len(drives)):
@@ -284,12 +297,5 @@ def _backward(
             r[:] = before
             _turned(A[k].T, backward, S, half, turned)
             S[:] = turned
-    for k in range(1, N):
-        for d in range(len(turns)):
-            t, i, c = turns[d, 0], turns[d, 1], turns[d, 2]
-            by_change[t] += dA[t, kind[k], i, c] * adjoint[k, i] * smoothed[k - 1, c]
-    by_first = np.empty((n, n))
-    for i in range(n):
-        for c in range(n):
-            by_first[i, c] = 0.5 * (r[i] * r[c] - S[i, c])
-    return smoothed, error, by_noise, by_drive, by_first, by_change
+    _through_means(dA, turns, kind, adjoint, smoothed, by_change)
+    return smoothed, error, by_noise, by_drive, 0.5 * (np.outer(r, r) - S), by_change
