@@ -4,6 +4,7 @@ import contextlib
 import io
 import json
 import math
+import re
 import sys
 from dataclasses import dataclass
 from unittest.mock import patch
@@ -31,6 +32,10 @@ NEED_CRAFT = {
 NEED_NONE = ("gates watch", "gates predict", "gates simulate", "gates history")
 
 
+#: What a slow machine gets to read of long work.
+_PROGRESS = re.compile(r"^.*\b(so far|left)\n", re.MULTILINE)
+
+
 def run(*words, craft: str | None = "cassini") -> Run:
     """`asflown WORDS...` with its exit code and both its outputs; of Cassini unless the words or ``craft`` say otherwise."""
     from asflown.cli.main import main
@@ -48,7 +53,7 @@ def run(*words, craft: str | None = "cassini") -> Run:
             main()
         except SystemExit as end:
             code = end.code
-    return Run(int(code or 0), out.getvalue(), err.getvalue())
+    return Run(int(code or 0), out.getvalue(), _PROGRESS.sub("", err.getvalue()))
 
 
 def strict_json(text: str) -> dict:

@@ -204,7 +204,7 @@ def test_what_is_no_earlier_fit_is_refused(rcs, tmp_path):
     model = tmp_path / "m.json"
     for text in ("", "[]", "{}", '{"command": "torque"}', '{"command": "gates", "engine": "rcs"}'):
         model.write_text(text)
-        assert "no record of a fit" in complaint("gates", rcs, "--prior", model)
+        assert "record of a fit" in complaint("gates", rcs, "--prior", model)
     record = run("gates", rcs, "--json").record
     model.write_text(json.dumps(record | {"engine": "main-engine"}))
     assert "model of main-engine" in complaint("gates", rcs, "--against", model)

@@ -315,7 +315,9 @@ def _is_known(c: Channel, value: float) -> bool:
     factor, shift = to_si(c.name, c.unit_given) if c.unit_given else (1.0, 0.0)
     for written in (abs(value), abs((value - shift) / factor)):
         digits = f"{written:.7g}".replace(".", "")
-        if np.float32(written) in _FILL_VALUES or (len(digits) >= 3 and set(digits) == {"9"}):
+        with np.errstate(over="ignore"):
+            usual = np.float32(written) in _FILL_VALUES
+        if usual or (len(digits) >= 3 and set(digits) == {"9"}):
             return True
     return False
 

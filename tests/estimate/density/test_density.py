@@ -173,7 +173,7 @@ def test_recovery_of_the_peak_from_two_axes(tmp_path):
 
 
 @pytest.mark.parametrize(("text", "words"), [
-    (None, "cannot be read"),
+    (None, "no such"),
     ("time,area\n0,1\n1,1\n", "header"),
     ("time [s],area [m2],arm_w [m]\n0,1,1\n1,1,1\n", "header"),
     ("time [s],area [m2],arm_z [m]\n0,1,1\n", "two rows"),

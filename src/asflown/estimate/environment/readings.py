@@ -10,7 +10,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
+import scipy
 
 from ...dynamics.rigid_body import momentum_regressor
 from ...kit.doubts import Doubt, Kind, Severity
@@ -112,7 +112,7 @@ def _alike(matrix: np.ndarray, t: np.ndarray) -> np.ndarray:
 
 def _grown(R: np.ndarray, t: np.ndarray, torque: np.ndarray) -> np.ndarray:
     """Momentum that torques (N, 3, p) have brought, body axes."""
-    return np.swapaxes(R, 1, 2) @ cumulative_trapezoid(R @ torque, t, axis=0, initial=0)
+    return np.swapaxes(R, 1, 2) @ scipy.integrate.cumulative_trapezoid(R @ torque, t, axis=0, initial=0)
 
 
 def _readings(each: np.ndarray, directions: np.ndarray, names: Sequence[str]) -> Iterator[tuple[str, np.ndarray]]:

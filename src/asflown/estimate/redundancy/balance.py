@@ -17,7 +17,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import nnls
+import scipy
 
 from ...kit.regression import memory
 from ...telemetry.channels import AXES
@@ -266,7 +266,7 @@ def _loop(motion: Motion, source: str, parts: np.ndarray, slow_s: float | None) 
         for j in range(3):
             both = np.column_stack([rate[:, j], angle[:, j]])
             size = np.maximum(np.linalg.norm(both, axis=0), 1e-300)
-            gains, _ = nnls(both / size, total[:, j])
+            gains, _ = scipy.optimize.nnls(both / size, total[:, j])
             residual[:, j] = total[:, j] - both / size @ gains
         return residual
 

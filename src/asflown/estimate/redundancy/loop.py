@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import nnls
+import scipy
 
 from ...kit.doubts import Kind, Severity
 from ...telemetry.attitude import MISTAKEN_UNITS
@@ -72,7 +72,7 @@ def rates_too_large(subject: Subject, motion: Motion) -> list[Doubt]:
         size = np.linalg.norm(both, axis=0)
         if not (size > 0).all():
             continue
-        gains, left = nnls(both / size, given[:, j])
+        gains, left = scipy.optimize.nnls(both / size, given[:, j])
         if left**2 > (1 - _EXPLAINED) * float(given[:, j] @ given[:, j]) or not (gains > 0).all():
             continue
         D, K = gains / size
