@@ -62,7 +62,7 @@ def earlier_model(path: Path, engine: str) -> PastModel:
     Its biases count as taken out of further burns, but for a fit that is mean-aware, as in `gates predict`.  Raises BadInput
     for what is no record of a fit, was made of too few burns to hold values, or is another engine's."""
     remedy = "Give what `asflown gates FILE --json` printed of maneuvers with magnitude and pointing errors."
-    with reading(path, remedy, "the record of a fit"):
+    with reading(path, remedy, "this JSON is no record of a fit, it"):
         record = json.loads(read_bytes(path, "record of a fit", remedy))
     if not isinstance(record, dict):
         record = {}

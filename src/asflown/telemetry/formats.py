@@ -15,6 +15,7 @@ from ..kit.progress import stage
 from ..kit.reading import limit
 from ..kit.timeline import utc_to_posix_ns
 from .channels import member_names
+from .probe import check_hdf5
 from .tables import Table, checked, quiet_database, quoted_pattern, said, share_done, typed
 from .text import form_of_rows
 from .times import NotATime, exact_ns, scale_called
@@ -114,6 +115,8 @@ def _groups(path: Path, xarray) -> list:
     """The data sets of a file, its root first."""
     with path.open("rb") as file:
         classic = file.read(3) == b"CDF"
+    if not classic:
+        check_hdf5(path)
     how: dict[str, Any] = {"engine": "scipy"} if classic else {"engine": "h5netcdf", "phony_dims": "sort"}
     try:
         with warnings.catch_warnings():
@@ -395,6 +398,7 @@ def read_matlab73(path: Path) -> list[Table]:
     """A MATLAB file of version 7.3, which is HDF5: vectors and matrices of one length as columns."""
     import h5py
 
+    check_hdf5(path)
     arrays: dict[str, np.ndarray] = {}
 
     def keep(name: str, item) -> None:
