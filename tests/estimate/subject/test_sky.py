@@ -65,7 +65,9 @@ def test_every_subject_carries_the_doubts_and_the_orbit_of_the_craft_file_serves
     craft = load_craft(orbiting.craft_file(tmp_path))
     apart = _other("magnetic_field", _inertial)
     assert subject_of(apart, craft).doubts.has(FIELD_APART)
-    begins = {"epoch": int(apart.channels["quaternion_w"].tai_ns[0])}  # of the record's day: months of an orbit take seconds
+    begins = {
+        "epoch": int(apart.channels["quaternion_w"].tai_ns[0])
+    }  # of the record's day: months of an orbit take seconds
     of_file = craft.model_copy(update={"orbit": load_craft("pyramid").orbit.model_copy(update=begins)})
     bare = without(apart, "orbit_position", "orbit_velocity")
     assert not sky_doubts(bare, craft) and sky_doubts(bare, of_file)
