@@ -274,7 +274,7 @@ def tried(name: str, seed: int, folder: Path) -> str | None:
 
 #: (reader, seed) of inputs that once escaped.
 FOUND: tuple[tuple[str, int], ...] = (
-    ("maneuvers", 15), ("plan", 15), ("torques", 23), ("h5", 39), ("h5", 768), ("h5", 2802), ("nc", 11), ("nc", 13), ("nc", 201), ("parquet", 3),
+    ("maneuvers", 15), ("plan", 15), ("torques", 23), ("h5", 39), ("h5", 768), ("h5", 2471), ("h5", 2802), ("nc", 11), ("nc", 13), ("nc", 201), ("parquet", 3),
     ("drag", 575), ("drag", 870), ("trajectory", 1134),
 )  # fmt: skip
 
