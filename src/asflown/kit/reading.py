@@ -64,7 +64,9 @@ def read_bytes(path: str | Path, what: str, remedy: str) -> bytes:
         if isinstance(why, BadInput):
             raise
         raise BadInput(
-            f"there is no such {what}, or it cannot be read ({getattr(why, 'strerror', None) or why})", file=path, remedy=remedy
+            f"there is no such {what}, or it cannot be read ({getattr(why, 'strerror', None) or why})",
+            file=path,
+            remedy=remedy,
         ) from None
 
 
