@@ -128,8 +128,7 @@ def test_the_time_column_may_be_utc_gps_or_seconds(good, tmp_path):
 
 
 def test_gzip_parquet_line_ends_delimiters_and_a_byte_order_mark_change_nothing(good, tmp_path):
-    quick = ("--method", "momentum")
-    base = torque(good, *quick)
+    base = torque(good, *QUICK)
     text = good.read_text()
     write_table(load_telemetry(good), tmp_path / "t.parquet")
     copies = [
@@ -145,7 +144,7 @@ def test_gzip_parquet_line_ends_delimiters_and_a_byte_order_mark_change_nothing(
         tmp_path / "t.parquet",
     ]
     for path in copies:
-        record = torque(path, *quick)
+        record = torque(path, *QUICK)
         assert record["torque_Nm"] == base["torque_Nm"] and record["doubts"] == base["doubts"], path.name
 
 

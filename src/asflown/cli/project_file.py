@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ConfigDict
 
-from ..kit.config import read_bytes, toml_table, validated
+from ..kit.config import toml_table, validated
 from ..kit.errors import BadInput, some_of
+from ..kit.reading import read_bytes
 from ..kit.result import inputs_of
 from .project import Defaults
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from importlib import resources
 from pathlib import Path
 
-from ..kit.config import read_bytes, toml_table, validated
+from ..kit.config import toml_table, validated
 from ..kit.errors import BadInput, some_of
-from ..kit.reading import reading
+from ..kit.reading import read_bytes, reading
 from ..kit.result import inputs_of
 from .model import Craft
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from ..kit.config import read_bytes, validated
+from ..kit.config import validated
 from ..kit.errors import BadInput
+from ..kit.reading import read_bytes
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -11,8 +11,6 @@ from pydantic import BaseModel, ValidationError
 from .errors import BadInput
 from .reading import read_bytes, reading
 
-__all__ = ["changes_of", "read_bytes", "toml_table", "validated"]
-
 Model = TypeVar("Model", bound=BaseModel)
 
 
@@ -34,6 +32,18 @@ def validated(model: type[Model], table: dict, file: object, remedy: str) -> Mod
             raise BadInput(why.what, file=file, channel=why.channel, remedy=why.remedy) from None
         except ValidationError as why:
             raise BadInput(_in_words(why, model), file=file, remedy=remedy) from None
+
+
+def document(
+    model: type[Model], source: object, called: str, what: str, hint: str, remedy: str
+) -> tuple[Model, object]:
+    """What a TOML file, or a dict of the same keys, holds as a ``model``, and what to call it in messages: its path, or ``called``.
+
+    ``what`` it should be and ``hint`` serve where there is no file.  Raises BadInput as ``read_bytes``, ``toml_table``, ``validated``."""
+    if isinstance(source, dict):
+        return validated(model, source, called, remedy), called
+    content = read_bytes(source, what, hint)  # type: ignore[arg-type]
+    return validated(model, toml_table(content, source), source, remedy), source
 
 
 def _in_words(why: ValidationError, model: type[BaseModel]) -> str:

@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from ..kit.config import read_bytes, toml_table, validated
+from ..kit.config import document
 from ..kit.errors import BadInput, some_of
 from ..kit.quantities import si_factor
+from ..kit.reading import reading
 from ..telemetry.channels import split_header
 from ..telemetry.tables import Table, numbers_of, words_of
 from .columns import NUMBERS, WORDS
@@ -59,15 +60,10 @@ class ManeuverDictionary(_Part):
 def load_maneuver_dictionary(path) -> ManeuverDictionary:
     """Read and check a dictionary, from a file or a dict of its keys.  Raises BadInput for a missing file, an unknown key, name or unit."""
     remedy = "docs/maneuvers.md lists the keys of a dictionary of maneuver tables."
-    if isinstance(path, dict):
-        entry, path = validated(ManeuverDictionary, path, "columns", remedy), "columns"
-    else:
-        source = read_bytes(path, "dictionary of maneuver tables", "Give a TOML file; docs/maneuvers.md shows one.")
-        entry = validated(ManeuverDictionary, toml_table(source, path), path, remedy)
-    try:
+    hint = "Give a TOML file; docs/maneuvers.md shows one."
+    entry, name = document(ManeuverDictionary, path, "columns", "dictionary of maneuver tables", hint, remedy)
+    with reading(name, remedy):
         _check(entry)
-    except BadInput as why:
-        raise BadInput(why.what, remedy=why.remedy, file=path, channel=why.channel) from None
     return entry
 
 

@@ -8,8 +8,9 @@ from typing import ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, PrivateAttr
 
-from ..kit.config import read_bytes, toml_table, validated
+from ..kit.config import toml_table, validated
 from ..kit.errors import BadInput, some_of
+from ..kit.reading import read_bytes
 
 
 class Part(BaseModel):

@@ -31,10 +31,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from ..kit.config import toml_table, validated
+from ..kit.config import document
 from ..kit.errors import BadInput, some_of
 from ..kit.quantities import is_unit, quantity, si_factor
-from ..kit.reading import read_bytes, reading
+from ..kit.reading import reading
 from ..kit.rotations import euler, lvlh_to_inertial, quaternion, rotation
 from ..kit.timeline import NS
 from .assemble import Clock, Part, Read, Use, assembled
@@ -164,12 +164,9 @@ class ChannelDictionary(_Part):
 def load_dictionary(path) -> ChannelDictionary:
     """Read and check a dictionary, from a file or a dict of its keys.  Raises BadInput for a missing file, an unknown key, name or unit."""
     remedy = "docs/telemetry.md lists the keys of a channel dictionary."
-    if isinstance(path, dict):
-        entry, path = validated(ChannelDictionary, path, "channels", remedy), "channels"
-    else:
-        source = read_bytes(path, "channel dictionary", "Give a TOML file; examples/ holds some.")
-        entry = validated(ChannelDictionary, toml_table(source, path), path, remedy)
-    with reading(path, remedy):
+    hint = "Give a TOML file; examples/ holds some."
+    entry, name = document(ChannelDictionary, path, "channels", "channel dictionary", hint, remedy)
+    with reading(name, remedy):
         _check(entry)
     return entry
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..kit.errors import BadInput, some_of
+from ..kit.reading import plain_number
 from ..kit.timeline import NS, posix_to_tai_ns
 from .channels import split_header
 from .times import NotATime, Scale, dated_ns, exact_ns, is_stamp
@@ -121,13 +122,11 @@ def numbers_of(table: Table, column: int, channel: str) -> tuple[np.ndarray, np.
 
 
 def _number(cell: str) -> float:
-    """A cell as a number; NaN for one that is none.  Python also reads 1_000 and digits of other scripts: telemetry is not written so."""
+    """A cell as a number; NaN for one that is none."""
     if not cell.isascii():
         cell = cell.replace("\N{MINUS SIGN}", "-").strip()  # also without a hard blank
-    if not cell.isascii() or "_" in cell:
-        return np.nan
     try:
-        return float(cell)
+        return plain_number(cell)
     except ValueError:
         return float(cell.upper().replace("D", "E")) if _FORTRAN.fullmatch(cell) else np.nan
 

@@ -17,10 +17,10 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy
 
 from ...kit.regression import memory
 from ...telemetry.channels import AXES
+from .loop import fitted_gains
 from .motion import GYRO, NAMES
 from .rates import BETTER, LATE_S, LATE_STEPS, LATEST_S, SIGNIFICANT
 
@@ -264,10 +264,8 @@ def _loop(motion: Motion, source: str, parts: np.ndarray, slow_s: float | None) 
     def left(total: np.ndarray) -> np.ndarray:
         residual = np.empty_like(total)
         for j in range(3):
-            both = np.column_stack([rate[:, j], angle[:, j]])
-            size = np.maximum(np.linalg.norm(both, axis=0), 1e-300)
-            gains, _ = scipy.optimize.nnls(both / size, total[:, j])
-            residual[:, j] = total[:, j] - both / size @ gains
+            (D, K), _ = fitted_gains(rate[:, j], angle[:, j], total[:, j])
+            residual[:, j] = total[:, j] - (D * rate[:, j] + K * angle[:, j])
         return residual
 
     return Balance("loop", rate, parts, motion.wheels, motion.grid.step_s, motion.cadence_s, source, fitted=left)

@@ -52,6 +52,14 @@ def rates_unit(motion: Motion, wrong: set[str]) -> list[Doubt]:
     return []
 
 
+def fitted_gains(rate: np.ndarray, angle: np.ndarray, given: np.ndarray) -> tuple[np.ndarray, float]:
+    """Gains of rate and angle, neither negative, of the loop that explains a torque about one axis best; the norm of what it leaves."""
+    both = np.column_stack([rate, angle])
+    size = np.maximum(np.linalg.norm(both, axis=0), 1e-300)
+    gains, left = scipy.optimize.nnls(both / size, given)
+    return gains / size, float(left)
+
+
 def rates_too_large(subject: Subject, motion: Motion) -> list[Doubt]:
     """Where the craft describes no controller and only gyros tell the motion.
 
@@ -68,14 +76,12 @@ def rates_too_large(subject: Subject, motion: Motion) -> list[Doubt]:
     given = motion.quick(motion.gained().sum(axis=1))
     rate, angle = motion.quick(motion.rates[GYRO]), motion.quick(motion.angles[GYRO])
     for j, axis in enumerate("xyz"):
-        both = np.column_stack([rate[:, j], angle[:, j]])
-        size = np.linalg.norm(both, axis=0)
-        if not (size > 0).all():
+        if not (rate[:, j].any() and angle[:, j].any()):
             continue
-        gains, left = scipy.optimize.nnls(both / size, given[:, j])
+        gains, left = fitted_gains(rate[:, j], angle[:, j], given[:, j])
         if left**2 > (1 - _EXPLAINED) * float(given[:, j] @ given[:, j]) or not (gains > 0).all():
             continue
-        D, K = gains / size
+        D, K = gains
         damping = float(D / (2 * np.sqrt(K * I_B[j, j])))
         for factor, unit in MISTAKEN_UNITS.items():
             better = damping * np.sqrt(factor)
